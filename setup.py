@@ -1,0 +1,15 @@
+from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import setup
+
+setup(
+    **generate_distutils_setup(
+        packages=[
+            "tld_follower",
+            "tld_follower.evaluation",
+            "tld_follower.following",
+            "tld_follower.nodes",
+            "tld_follower.tld",
+        ],
+        package_dir={"": "src"},
+    )
+)
