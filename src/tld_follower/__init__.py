@@ -1,0 +1,1 @@
+"""Find, follow and never touch: a drone that follows a target it was shown once."""
