@@ -1,0 +1,141 @@
+"""/pointsdepthA: one velocity command for every box, from the box and the cloud of the same image."""
+
+import math
+import threading
+
+import rospy
+from geometry_msgs.msg import Twist, Vector3
+from sensor_msgs.msg import PointCloud2
+
+from tld_follower.following.follower import Follower
+from tld_follower.following.parameters import Parameters
+from tld_follower.msg import BoundingBoxStamped, FollowState
+from tld_follower.nodes.conversions import cloud_points, message_box
+from tld_follower.nodes.newest import Newest
+
+_UNKNOWN_VELOCITY = Vector3(math.nan, math.nan, math.nan)
+
+
+def twist(command):
+    """Make the Twist of a `Command`."""
+    message = Twist(linear=Vector3(command.x, command.y, command.z))
+    message.angular.z = command.yaw
+    return message
+
+
+class FollowerNode:
+    """Pairs boxes with clouds by stamp and publishes what the `Follower` decides.
+
+    A box waits for its cloud, in ROS time, so that a simulation in lockstep always gets the pair.
+    """
+
+    def __init__(self):
+        settings = dict(rospy.get_param("~", {}))
+        self._cloud_wait = settings.pop("cloud_wait", 0.1)
+        self._parameters = Parameters.from_dict(settings)
+        self._follower = Follower(self._parameters)
+        self._boxes = Newest()
+        self._clouds = threading.Condition()
+        self._cloud = None  # the newest message
+        self._stamp = rospy.Time()
+
+        self._command = rospy.Publisher("/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
+        self._state = rospy.Publisher("~state", FollowState, queue_size=10, tcp_nodelay=True)
+        rospy.Subscriber(
+            "/stereo/points2", PointCloud2, self._take_cloud, queue_size=1, tcp_nodelay=True
+        )
+        rospy.Subscriber(
+            "/pointstampA", BoundingBoxStamped, self._boxes.put, queue_size=1, tcp_nodelay=True
+        )
+
+    def _take_cloud(self, message):
+        with self._clouds:
+            self._cloud = message
+            self._clouds.notify_all()
+
+    def run(self):
+        """Process boxes until ROS shuts down, then stop the drone."""
+        while not rospy.is_shutdown():
+            message = self._boxes.take(timeout=0.5)
+            if message is not None:
+                self._process(message)
+
+    def _process(self, message):
+        stamp = message.header.stamp
+        if stamp < self._stamp:
+            rospy.logwarn("time jumped back by %.3f s; starting afresh", (self._stamp - stamp).to_sec())
+            self._follower = Follower(self._parameters)
+            with self._clouds:
+                if self._cloud is not None and self._cloud.header.stamp > stamp:
+                    self._cloud = None
+        self._stamp = stamp
+        cloud = self._paired_cloud(stamp)
+        now = rospy.Time.now()
+        points, cloud_age = None, math.inf
+        if cloud is not None:
+            points, cloud_age = self._points(cloud), (now - cloud.header.stamp).to_sec()
+        try:
+            box = message_box(message.box)
+        except ValueError as error:
+            rospy.logerr_throttle(5.0, f"box ignored: {error}")
+            box = None
+        state = self._follower.update(box, message.box.target, (now - stamp).to_sec(), points, cloud_age)
+        self._publish(message.header, state)
+
+    def _paired_cloud(self, stamp):
+        """Return the cloud of this stamp; the newest one if it will not come in time."""
+        deadline = rospy.Time.now() + rospy.Duration(self._cloud_wait)
+
+        def expected():
+            if self._boxes.waiting:
+                return False
+            # Clouds come in order: one of this stamp or a later one means that no better one comes.
+            if self._cloud is None:
+                return self._parameters.distance == "stereo"
+            behind = (stamp - self._cloud.header.stamp).to_sec()
+            return 0 < behind < self._parameters.max_age
+
+        with self._clouds:
+            while expected() and rospy.Time.now() < deadline and not rospy.is_shutdown():
+                self._clouds.wait(0.02)
+            return self._cloud
+
+    def _points(self, cloud):
+        try:
+            points = cloud_points(cloud)
+            height, width = points.shape[:2]
+            if (width, height) != (self._parameters.image_width, self._parameters.image_height):
+                raise ValueError(
+                    f"cloud of {width}x{height} points for images of "
+                    f"{self._parameters.image_width}x{self._parameters.image_height} pixels"
+                )
+        except ValueError as error:
+            rospy.logerr_throttle(5.0, f"cloud ignored: {error}")
+            return None
+        return points
+
+    def _publish(self, header, state):
+        command = twist(state.command)
+        self._command.publish(command)
+        self._state.publish(
+            FollowState(
+                header=header,
+                mode=state.mode,
+                reason=state.reason,
+                distance=state.distance,
+                nearest_obstacle=state.nearest_obstacle,
+                target_velocity=_UNKNOWN_VELOCITY,
+                command=command,
+            )
+        )
+
+
+def main():
+    """Run the node until ROS shuts down."""
+    rospy.init_node("pointsdepthA")
+    try:
+        node = FollowerNode()
+    except ValueError as error:
+        rospy.logfatal(str(error))
+        raise SystemExit(1) from error
+    node.run()

@@ -1,0 +1,141 @@
+"""/NODE: one box for every left image, found by Tracking-Learning-Detection."""
+
+import threading
+
+import cv2
+import rospy
+from sensor_msgs.msg import Image, RegionOfInterest
+
+from tld_follower.box import Box
+from tld_follower.msg import BoundingBox
+from tld_follower.nodes.conversions import box_message, grey_image, image_array
+from tld_follower.nodes.newest import Newest
+from tld_follower.tld.parameters import Parameters
+from tld_follower.tld.tracker import Tracker, warm_up
+
+GREEN, WHITE = (0, 220, 0), (255, 255, 255)
+
+
+def parse_box(text):
+    """Read `x,y,width,height` in pixels; an empty text is no box."""
+    values = [float(value) for value in str(text).strip("[]() ").split(",") if value.strip()]
+    if not values:
+        return None
+    if len(values) != 4:
+        raise ValueError(f"a box is x,y,width,height in pixels, not {text!r}")
+    return Box(*values)
+
+
+class TrackerNode:
+    """Feeds images to a `Tracker` in one worker thread and publishes what it finds.
+
+    A new target is learnt from the newest image at once; /NODE/target (latched) says that it was.
+    """
+
+    def __init__(self):
+        settings = dict(rospy.get_param("~", {}))
+        seed, every_frame = settings.pop("seed", 0), settings.pop("every_frame", False)
+        self._request = parse_box(settings.pop("init_box", ""))
+        self._tracker = Tracker(Parameters.from_dict(settings), seed=seed)
+        self._work = Newest(every=every_frame)
+        self._request_lock = threading.Lock()
+        self._image = None
+        self._targets = 0
+        self._stamp = rospy.Time()
+        warm_up()
+
+        self._boxes = rospy.Publisher("/pointA", BoundingBox, queue_size=10, tcp_nodelay=True)
+        self._view = rospy.Publisher("~view", Image, queue_size=1)
+        self._target = rospy.Publisher("~target", RegionOfInterest, queue_size=1, latch=True)
+        rospy.Subscriber("~init", RegionOfInterest, self._init, queue_size=1)
+        rospy.Subscriber(
+            "/stereo/left/image_raw",
+            Image,
+            self._work.put,
+            queue_size=None if every_frame else 1,
+            tcp_nodelay=True,
+        )
+
+    def _init(self, region):
+        with self._request_lock:
+            self._request = Box(region.x_offset, region.y_offset, region.width, region.height)
+        self._work.wake()  # learn from the newest image without waiting for the next
+
+    def run(self):
+        """Process images until ROS shuts down."""
+        while not rospy.is_shutdown():
+            message = self._work.take(timeout=0.5)
+            if message is not None:
+                self._process(message)
+            elif self._image is not None:
+                self._learn_requested()
+
+    def _process(self, message):
+        stamp = message.header.stamp
+        if stamp < self._stamp:
+            rospy.logwarn("time jumped back by %.3f s; going on", (self._stamp - stamp).to_sec())
+        self._stamp = stamp
+        box, confidence = None, 0.0
+        try:
+            grey = grey_image(message)
+            self._image = grey
+            shown = self._learn_requested()
+            if shown is not None:
+                box, confidence = shown, 1.0
+            elif self._tracker.initialised:
+                result = self._tracker.update(grey)
+                box, confidence = result.box, result.confidence
+        except ValueError as error:
+            rospy.logerr_throttle(5.0, f"image skipped: {error}")
+        self._boxes.publish(box_message(box, confidence, stamp, self._targets))
+        if self._view.get_num_connections():
+            self._publish_view(message, box, confidence)
+
+    def _learn_requested(self):
+        """Learn the requested target from the newest image; return its box, or None if there was no request."""
+        with self._request_lock:
+            box, self._request = self._request, None
+        if box is None:
+            return None
+        try:
+            self._tracker.init(self._image, box)
+        except ValueError as error:
+            rospy.logerr(f"target refused: {error}")
+            return None
+        self._targets += 1
+        rospy.loginfo("target %d: x %g, y %g, %g x %g pixels", self._targets, box.x, box.y, box.width, box.height)
+        self._target.publish(
+            RegionOfInterest(
+                x_offset=round(box.x), y_offset=round(box.y), width=round(box.width), height=round(box.height)
+            )
+        )
+        return box
+
+    def _publish_view(self, message, box, confidence):
+        """Publish the image with the box drawn in, in colour."""
+        if message.encoding in ("rgb8", "bgr8"):
+            pixels, encoding = image_array(message).copy(), message.encoding
+        else:
+            pixels, encoding = cv2.cvtColor(self._image, cv2.COLOR_GRAY2BGR), "bgr8"
+        if box is None:
+            text = "lost" if self._targets else "waiting for a target"
+        else:
+            text = f"{confidence:.2f}"
+            corner = (round(box.x), round(box.y))
+            cv2.rectangle(pixels, corner, (round(box.x + box.width), round(box.y + box.height)), GREEN, 2)
+        cv2.putText(pixels, text, (8, pixels.shape[0] - 10), cv2.FONT_HERSHEY_SIMPLEX, 0.6, WHITE, 1, cv2.LINE_AA)
+        view = Image(header=message.header, encoding=encoding, data=pixels.tobytes())
+        view.height, view.width, view.step = pixels.shape[0], pixels.shape[1], pixels.shape[1] * 3
+        self._view.publish(view)
+
+
+def main():
+    """Run the node until ROS shuts down."""
+    cv2.setNumThreads(1)  # the other cores belong to the other nodes
+    rospy.init_node("NODE")
+    try:
+        node = TrackerNode()
+    except ValueError as error:
+        rospy.logfatal(str(error))
+        raise SystemExit(1) from error
+    node.run()
