@@ -75,9 +75,7 @@ class Follower:
         retreat = self._avoidance.retreat(nearest)
         if box is None:
             if retreat:
-                return State(
-                    Mode.AVOIDING, "something is too near", math.nan, nearest, Command(x=retreat)
-                )
+                return State(Mode.AVOIDING, "something is too near", math.nan, nearest, Command(x=retreat))
             return State(Mode.LOST, "the target is not in view", math.nan, nearest)
 
         self._seen = True

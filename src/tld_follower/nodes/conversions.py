@@ -64,7 +64,9 @@ def cloud_points(message):
     if not height or not width:
         raise ValueError("empty point cloud")
     if message.is_bigendian or step % 4 or x % 4 or message.row_step != width * step or step < x + 12:
-        raise ValueError(f"point cloud layout is not supported: point_step {step}, row_step {message.row_step}")
+        raise ValueError(
+            f"point cloud layout is not supported: point_step {step}, row_step {message.row_step}"
+        )
     if len(message.data) < height * message.row_step:
         raise ValueError(f"point cloud of {width}x{height} holds {len(message.data)} bytes")
     values = np.frombuffer(message.data, np.float32, height * width * step // 4)

@@ -41,12 +41,8 @@ class FollowerNode:
 
         self._command = rospy.Publisher("/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
         self._state = rospy.Publisher("~state", FollowState, queue_size=10, tcp_nodelay=True)
-        rospy.Subscriber(
-            "/stereo/points2", PointCloud2, self._take_cloud, queue_size=1, tcp_nodelay=True
-        )
-        rospy.Subscriber(
-            "/pointstampA", BoundingBoxStamped, self._boxes.put, queue_size=1, tcp_nodelay=True
-        )
+        rospy.Subscriber("/stereo/points2", PointCloud2, self._take_cloud, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("/pointstampA", BoundingBoxStamped, self._boxes.put, queue_size=1, tcp_nodelay=True)
 
     def _take_cloud(self, message):
         with self._clouds:

@@ -18,7 +18,14 @@ MOVES = {
     " ": (0, 0),
 }  # fmt: skip
 # key -> factors of the speed and the turn rate
-CHANGES = {"q": (1.1, 1.1), "z": (1 / 1.1, 1 / 1.1), "w": (1.1, 1), "x": (1 / 1.1, 1), "e": (1, 1.1), "c": (1, 1 / 1.1)}
+CHANGES = {
+    "q": (1.1, 1.1),
+    "z": (1 / 1.1, 1 / 1.1),
+    "w": (1.1, 1),
+    "x": (1 / 1.1, 1),
+    "e": (1, 1.1),
+    "c": (1, 1 / 1.1),
+}
 
 HELP = """Drive Husky:
    u    i    o        q/z  speed and turn rate up/down by 10 %
@@ -87,7 +94,9 @@ def main():
         rospy.get_param("~max_turn", 2.0),
     )
     if sys.stdin is None or not sys.stdin.isatty():
-        rospy.loginfo("no terminal to read keys from: staying idle; run 'rosrun tld_follower teleop_twist_keyboard'")
+        rospy.loginfo(
+            "no terminal to read keys from: staying idle; run 'rosrun tld_follower teleop_twist_keyboard'"
+        )
         rospy.spin()
         return
     print(HELP, flush=True)

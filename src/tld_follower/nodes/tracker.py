@@ -103,7 +103,9 @@ class TrackerNode:
             rospy.logerr(f"target refused: {error}")
             return None
         self._targets += 1
-        rospy.loginfo("target %d: x %g, y %g, %g x %g pixels", self._targets, box.x, box.y, box.width, box.height)
+        rospy.loginfo(
+            "target %d: x %g, y %g, %g x %g pixels", self._targets, box.x, box.y, box.width, box.height
+        )
         self._target.publish(
             RegionOfInterest(
                 x_offset=round(box.x), y_offset=round(box.y), width=round(box.width), height=round(box.height)
@@ -123,7 +125,9 @@ class TrackerNode:
             text = f"{confidence:.2f}"
             corner = (round(box.x), round(box.y))
             cv2.rectangle(pixels, corner, (round(box.x + box.width), round(box.y + box.height)), GREEN, 2)
-        cv2.putText(pixels, text, (8, pixels.shape[0] - 10), cv2.FONT_HERSHEY_SIMPLEX, 0.6, WHITE, 1, cv2.LINE_AA)
+        cv2.putText(
+            pixels, text, (8, pixels.shape[0] - 10), cv2.FONT_HERSHEY_SIMPLEX, 0.6, WHITE, 1, cv2.LINE_AA
+        )
         view = Image(header=message.header, encoding=encoding, data=pixels.tobytes())
         view.height, view.width, view.step = pixels.shape[0], pixels.shape[1], pixels.shape[1] * 3
         self._view.publish(view)

@@ -1,0 +1,184 @@
+"""`experiment`: fly a scenario on the whole ROS graph in lockstep, for several seeds, and measure it."""
+
+import argparse
+import json
+import re
+import sys
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import rospy
+
+from tld_follower.evaluation import graph, plots
+from tld_follower.evaluation.flight import Flight
+from tld_follower.evaluation.metrics import flight_figures
+from tld_follower.evaluation.scenarios import SCENARIOS
+
+FRAME_RATE = 30.0
+COLUMNS = (
+    ("seed", "seed", "{:d}"),
+    ("peak_gap_m", "peak gap", "{:.3f} m"),
+    ("steady_error_m", "steady error", "{:.3f} m"),
+    ("rmse_m", "rmse", "{:.3f} m"),
+    ("overshoot_m", "overshoot", "{:.3f} m"),
+    ("settle_s", "settled", "{:.2f} s"),
+    ("min_clearance_m", "clearance", "{:.2f} m"),
+    ("collisions", "collisions", "{:d}"),
+    ("tracked_fraction", "tracked", "{:.3f}"),
+    ("mean_overlap", "overlap", "{:.2f}"),
+    ("losses", "losses", "{:d}"),
+    ("real_time_factor", "real time", "{:.2f}x"),
+)
+
+
+def _resolution(text):
+    if not re.fullmatch(r"\d+x\d+", text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT")
+    return text
+
+
+def _positive(convert):
+    def parse(text):
+        value = convert(text)
+        if not value > 0:
+            raise argparse.ArgumentTypeError(f"{text} is not positive")
+        return value
+
+    return parse
+
+
+def parse_arguments(argv):
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog="experiment", description=__doc__)
+    parser.add_argument("scenario", choices=sorted(SCENARIOS))
+    parser.add_argument("--distance", choices=("stereo", "box"), default="stereo")
+    parser.add_argument("--control", choices=("thesis",), default="thesis")
+    parser.add_argument("--max-speed", type=_positive(float), default=1.5, metavar="M/S")
+    parser.add_argument("--tracker", choices=("tld", "tld_sift"), default="tld")
+    parser.add_argument("--resolution", type=_resolution, default="640x480", metavar="WxH")
+    parser.add_argument("--world", type=Path, metavar="FILE", help="SDF world (default: the testing grounds)")
+    parser.add_argument("--image-noise", type=float, default=1.0, metavar="SIGMA", help="grey levels")
+    parser.add_argument("--seeds", type=_positive(int), default=1, metavar="N", help="how many runs")
+    parser.add_argument("--first-seed", type=int, default=0, metavar="K")
+    parser.add_argument("--json", type=Path, metavar="F", help="write settings, figures and traces")
+    parser.add_argument(
+        "--report", type=Path, metavar="DIR", help="write plots, and a video of the first run"
+    )
+    return parser.parse_args(argv)
+
+
+def launch_arguments(settings, scenario, seed):
+    """Arguments of follow.launch for one run."""
+    arguments = {
+        "mode": "lockstep",
+        "lockstep_target": "true",
+        "lockstep_timeout": "30",
+        "paused": "true",
+        "resolution": settings.resolution,
+        "image_noise": settings.image_noise,
+        "seed": seed,
+        "spiri_pose": ",".join(f"{value:.6f}" for value in scenario.spiri_pose(seed)),
+        "distance": settings.distance,
+        "control": settings.control,
+        "max_speed": settings.max_speed,
+        "tracker": settings.tracker,
+    }
+    if settings.world:
+        arguments["world"] = settings.world.resolve()
+    return arguments
+
+
+def fly(settings, seed, logs, video_path):
+    """Fly one seed on a fresh graph; return the run's object for the JSON."""
+    scenario = SCENARIOS[settings.scenario]
+    with ExitStack() as stack:
+        video = None
+        if video_path:
+            size = tuple(map(int, settings.resolution.split("x")))
+            video = plots.Video(video_path, size, FRAME_RATE)
+            stack.callback(video.close)
+        flight = Flight(on_image=video.add if video else None)
+        stack.callback(flight.close)
+        log = logs / f"{scenario.name}-{seed}.log"
+        arguments = launch_arguments(settings, scenario, seed)
+        alive = stack.enter_context(graph.launched("follow.launch", arguments, log))
+        flight.wait_until_connected(alive)
+        trace, real_time_factor = flight.fly(scenario, alive)
+    figures = flight_figures(trace, scenario.halt - scenario.start)
+    return {"seed": seed, **figures, "real_time_factor": real_time_factor, "trace": trace}
+
+
+def table(runs):
+    """Lay out the runs' figures as text."""
+    rows = [[title for _, title, _ in COLUMNS]]
+    for run in runs:
+        rows.append(["-" if run[key] is None else form.format(run[key]) for key, _, form in COLUMNS])
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows
+    )
+
+
+def write_report(result, directory, drive_s):
+    """Write the plots; return their paths."""
+    title = f"{result['scenario']}: {result['control']} control, distance from {result['distance']}, at most {result['max_speed']} m/s"
+    distance, velocity = directory / "distance.png", directory / "velocity.png"
+    plots.plot_distance(result["runs"], drive_s, title, distance)
+    plots.plot_velocity(result["runs"][0], drive_s, title, velocity)
+    return distance, velocity
+
+
+def main(argv=None):
+    """Run the command; returns the exit code."""
+    settings = parse_arguments(argv)
+    if settings.world and not settings.world.is_file():
+        print(f"experiment: no world file {settings.world}", file=sys.stderr)
+        return 2
+    scenario = SCENARIOS[settings.scenario]
+    for directory in (settings.report, settings.json and settings.json.resolve().parent):
+        if directory:
+            directory.mkdir(parents=True, exist_ok=True)
+    result = {
+        "scenario": scenario.name,
+        "distance": settings.distance,
+        "control": settings.control,
+        "max_speed": settings.max_speed,
+        "tracker": settings.tracker,
+        "resolution": settings.resolution,
+        "world": str(settings.world.name) if settings.world else "testing_grounds.world",
+        "image_noise": settings.image_noise,
+        "runs": [],
+    }
+    logs = Path(tempfile.mkdtemp(prefix="tld_follower-experiment-"))
+    video = settings.report / "left_camera.webm" if settings.report else None
+    try:
+        with graph.private_master(logs):
+            rospy.init_node("experiment", disable_signals=True)
+            for seed in range(settings.first_seed, settings.first_seed + settings.seeds):
+                began = time.monotonic()
+                print(f"experiment: {scenario.name}, seed {seed} ...", file=sys.stderr, flush=True)
+                result["runs"].append(
+                    fly(settings, seed, logs, video if seed == settings.first_seed else None)
+                )
+                print(
+                    f"experiment: seed {seed} took {time.monotonic() - began:.0f} s",
+                    file=sys.stderr,
+                    flush=True,
+                )
+            rospy.signal_shutdown("done")
+    except (graph.GraphError, rospy.ROSException) as error:
+        print(f"experiment: {error}\nexperiment: logs are in {logs}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+    print(table(result["runs"]))
+    if settings.json:
+        settings.json.write_text(json.dumps(result, indent=1) + "\n")
+        print(f"figures and traces: {settings.json}")
+    if settings.report:
+        paths = [*write_report(result, settings.report, scenario.halt - scenario.start), video]
+        print("plots and video:", *paths, sep="\n  ")
+    return 0

@@ -1,0 +1,113 @@
+"""Plots and video of a flight, as thesis figures 4.3, 4.5 and 4.6 show theirs."""
+
+import cv2
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+from tld_follower.evaluation.metrics import SET_DISTANCE  # noqa: E402
+from tld_follower.following.follower import Mode  # noqa: E402
+from tld_follower.nodes.conversions import image_array, message_box  # noqa: E402
+
+TRUTH, FOUND, INK = "#5b6770", "#d1495b", "#222222"
+_FRAME_STEP = 2  # every second frame goes into the video
+
+
+def _axes(drive_s, title, unit):
+    figure, axes = plt.subplots(figsize=(8, 4), layout="constrained")
+    axes.axvspan(0, drive_s, color="#f2efe6", zorder=0)
+    axes.text(
+        drive_s / 2,
+        0.98,
+        "Husky drives",
+        transform=axes.get_xaxis_transform(),
+        ha="center",
+        va="top",
+        color=TRUTH,
+    )
+    axes.set(title=title, xlabel="time [s]", ylabel=unit)
+    axes.grid(color="#dddddd", linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def plot_distance(runs, drive_s, title, path):
+    """Plot the distance over time of every run, the first one in front (thesis figures 4.3 and 4.5)."""
+    figure, axes = _axes(drive_s, title, "distance to the target [m]")
+    axes.axhline(SET_DISTANCE, color=INK, linewidth=1, linestyle="--", label="set distance")
+    for run in reversed(runs[1:]):
+        axes.plot(run["trace"]["t"], run["trace"]["distance"], color=FOUND, alpha=0.25, linewidth=0.8)
+    trace = runs[0]["trace"]
+    measured = np.array(trace["measured_distance"], dtype=float)
+    axes.plot(trace["t"], measured, color=TRUTH, linewidth=0.8, label="as measured by the drone")
+    axes.plot(trace["t"], trace["distance"], color=FOUND, linewidth=1.8, label="true distance")
+    axes.set_ylim(0, max(2.0, 1.1 * max(max(run["trace"]["distance"]) for run in runs)))
+    axes.legend(loc="lower right", frameon=False)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def plot_velocity(run, drive_s, title, path):
+    """Plot both vehicles' speed along the first line of sight (thesis figure 4.6), and the command."""
+    trace = run["trace"]
+    figure, axes = _axes(drive_s, title, "forward velocity [m/s]")
+    axes.plot(trace["t"], np.array(trace["command"])[:, 0], color="#9aa5ad", linewidth=0.8, label="command")
+    axes.plot(trace["t"], np.array(trace["target_velocity"])[:, 0], color=INK, linewidth=1.5, label="Husky")
+    axes.plot(trace["t"], np.array(trace["drone_velocity"])[:, 0], color=FOUND, linewidth=1.5, label="Spiri")
+    axes.legend(loc="lower right", frameon=False)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+class Video:
+    """The left camera with the found box (green), the true one (white) and what the follower is doing."""
+
+    def __init__(self, path, resolution, rate):
+        self._writer = cv2.VideoWriter(
+            str(path), cv2.VideoWriter_fourcc(*"VP80"), rate / _FRAME_STEP, resolution
+        )
+        if not self._writer.isOpened():
+            raise OSError(f"cannot write a video to {path}")
+        self._count = 0
+
+    def add(self, frame, t):
+        """Add one frame of a flight; `frame` holds its image, box, state and truth messages."""
+        self._count += 1
+        if self._count % _FRAME_STEP:
+            return
+        self._writer.write(annotate(frame, t))
+
+    def close(self):
+        """Finish the file."""
+        self._writer.release()
+
+
+def annotate(frame, t):
+    """Draw boxes, mode and distances into a frame's image; returns BGR."""
+    picture = image_array(frame["image"])
+    if frame["image"].encoding == "rgb8":
+        picture = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
+    truth, state = frame["truth"], frame["state"]
+    for message, colour, width in ((truth.target_box, (255, 255, 255), 1), (frame["box"], (60, 220, 60), 2)):
+        box = message_box(message)
+        if box is not None:
+            corners = [(round(box.x), round(box.y)), (round(box.right), round(box.bottom))]
+            cv2.rectangle(picture, *corners, colour, width)
+    text = (
+        f"{t:+6.2f} s  {Mode(state.mode).name}  true {truth.distance:.2f} m  measured {state.distance:.2f} m"
+    )
+    place = (8, picture.shape[0] - 10)
+    for colour, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
+        cv2.putText(
+            picture,
+            text,
+            place,
+            cv2.FONT_HERSHEY_SIMPLEX,
+            picture.shape[1] / 1200,
+            colour,
+            width,
+            cv2.LINE_AA,
+        )
+    return picture

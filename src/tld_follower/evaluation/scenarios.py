@@ -1,0 +1,43 @@
+"""What the target does in each scenario, and where everything starts. Pure functions of time and seed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A flight: the target rests, is boxed at `box_at`, drives from `start` to `halt`, and is watched to `end`.
+
+    All times are seconds of simulated time since the start of the simulation.
+    """
+
+    name: str
+    box_at: float
+    start: float
+    halt: float
+    end: float
+    speed: float  # m/s
+
+    def target_command(self, t):
+        """Speed in m/s and turn rate in rad/s that Husky is commanded at time `t`."""
+        return (self.speed, 0.0) if self.start <= t < self.halt else (0.0, 0.0)
+
+    def spiri_pose(self, seed):
+        """Start pose x, y in m and yaw in rad; a seed moves it a little sideways and along.
+
+        Seed 0 starts right behind Husky, 1 m from it.
+        """
+        x, y, yaw = SPIRI_START
+        if seed:
+            x, y, yaw = (x, y, yaw) + np.random.default_rng(seed).uniform(-1, 1, 3) * (0.05, 0.15, 0.05)
+        return float(x), float(y), float(yaw)
+
+
+# 1 m from the left camera to Husky's rear at hover height, with Husky at the origin facing +x.
+SPIRI_START = (-1.57, 0.0, 0.0)
+
+# Thesis sections 4.2 and 4.3: rest, 12 s straight at 1 m/s, halt.
+STRAIGHT = Scenario("straight", box_at=4.0, start=6.0, halt=18.0, end=24.0, speed=1.0)
+
+SCENARIOS = {scenario.name: scenario for scenario in (STRAIGHT,)}
