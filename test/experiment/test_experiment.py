@@ -1,0 +1,74 @@
+"""The experiment command: two runs of a seed are identical, and what it writes is whole."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import cv2
+import pytest
+
+EXPERIMENT = Path(__file__).parents[2] / "scripts" / "experiment"
+
+
+def run(*arguments):
+    return subprocess.run([EXPERIMENT, *map(str, arguments)], capture_output=True, text=True, timeout=900)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Two runs of one seed, the first one with a report."""
+    folder = tmp_path_factory.mktemp("experiment")
+    found = []
+    for i, report in enumerate([["--report", folder / "report"], []]):
+        path = folder / f"{i}.json"
+        done = run(
+            "straight", "--seeds", 1, "--first-seed", 3, "--resolution", "320x240", "--json", path, *report
+        )
+        assert done.returncode == 0, done.stderr
+        assert "steady error" in done.stdout
+        found.append(json.loads(path.read_text()))
+    return folder, *found
+
+
+def test_two_lockstep_runs_give_identical_traces(results):
+    _, first, second = results
+    for result in (first, second):
+        (run,) = result["runs"]
+        run.pop("real_time_factor")
+    assert first == second
+
+
+def test_settings_and_figures_are_in_the_json(results):
+    _, result, _ = results
+    expected = {"scenario": "straight", "distance": "stereo", "control": "thesis", "resolution": "320x240"}
+    assert {name: result[name] for name in expected} == expected
+    (run,) = result["runs"]
+    assert run["seed"] == 3
+    assert run["collisions"] == 0
+    trace = run["trace"]
+    assert {len(column) for column in trace.values()} == {len(trace["t"])}
+    assert 18 * 30 < len(trace["t"]) < 21 * 30
+
+
+def test_plots_and_video_are_written(results):
+    report = results[0] / "report"
+    for name in ("distance.png", "velocity.png"):
+        assert cv2.imread(str(report / name)).shape[1] > 600
+    video = cv2.VideoCapture(str(report / "left_camera.webm"))
+    assert video.get(cv2.CAP_PROP_FRAME_WIDTH) == 320
+    assert video.read()[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["loop-the-loop"], "invalid choice"),
+        (["straight", "--resolution", "huge"], "WIDTHxHEIGHT"),
+        (["straight", "--max-speed", "-1"], "not positive"),
+        (["straight", "--world", "nowhere.world"], "no world file"),
+    ],
+)
+def test_wrong_arguments_are_refused(arguments, reason):
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert reason in done.stderr

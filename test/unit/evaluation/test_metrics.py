@@ -1,0 +1,77 @@
+import numpy as np
+import pytest
+
+from tld_follower.evaluation.metrics import flight_figures
+
+DRIVE = 12.0
+
+
+def flight(distance, box_visible=None, overlap=None, in_view=None):
+    """A trace at 30 Hz from 2 s before the drive to 6 s after it; `distance` is a function of time."""
+    t = np.arange(-60, 540) / 30
+    n = len(t)
+    visible = np.ones(n, bool) if box_visible is None else box_visible(t)
+    return {
+        "t": list(t),
+        "distance": [distance(x) for x in t],
+        "clearance": [0.6] * (n - 1) + [0.4],
+        "collisions": [0] * (n - 1) + [2],
+        "in_view": list(np.ones(n, bool) if in_view is None else in_view(t)),
+        "box_visible": list(visible),
+        "overlap": list(np.where(visible, 0.8 if overlap is None else overlap(t), 0.0)),
+    }
+
+
+def test_a_perfect_flight():
+    figures = flight_figures(flight(lambda t: 1.0), DRIVE)
+    for name in ("peak_gap_m", "steady_error_m", "rmse_m", "overshoot_m", "settle_s"):
+        assert figures[name] == 0
+    assert figures["tracked_fraction"] == figures["visible_fraction"] == 1
+    assert figures["mean_overlap"] == pytest.approx(0.8)
+    assert (figures["min_clearance_m"], figures["collisions"]) == (0.4, 2)
+    assert (figures["losses"], figures["recoveries"], figures["recovery_s"]) == (0, 0, None)
+
+
+def test_each_figure_looks_at_its_own_part_of_the_flight():
+    def distance(t):
+        if 2 <= t < 3:
+            return 1.9
+        if 5 <= t < 12:
+            return 1.3
+        if 12.5 <= t < 14:
+            return 0.8
+        return 1.0
+
+    figures = flight_figures(flight(distance), DRIVE)
+    assert figures["peak_gap_m"] == pytest.approx(0.9)
+    assert figures["steady_error_m"] == pytest.approx(0.3)
+    assert figures["overshoot_m"] == pytest.approx(0.2)
+    assert figures["settle_s"] == pytest.approx(2.0, abs=0.04)
+    squares = 1.0 * 0.9**2 + 7 * 0.3**2 + 1.5 * 0.2**2
+    assert figures["rmse_m"] == pytest.approx((squares / 14) ** 0.5, rel=0.02)
+
+
+def test_never_settled():
+    assert flight_figures(flight(lambda t: 1.1), DRIVE)["settle_s"] is None
+
+
+def test_losses_count_and_boxes_off_the_target_are_not_tracked():
+    figures = flight_figures(
+        flight(
+            lambda t: 1.0,
+            box_visible=lambda t: ~(((t >= 2) & (t < 3)) | (t >= 15)),
+            overlap=lambda t: np.where(t < 0, 0.2, 0.9),
+        ),
+        DRIVE,
+    )
+    assert (figures["losses"], figures["recoveries"]) == (2, 1)
+    assert figures["recovery_s"] == pytest.approx(1.0)
+    assert figures["tracked_fraction"] == pytest.approx((20 - 2 - 1 - 3) / 20)
+
+
+def test_frames_without_the_target_do_not_count_as_missed():
+    figures = flight_figures(
+        flight(lambda t: 1.0, box_visible=lambda t: t < 8, in_view=lambda t: t < 8), DRIVE
+    )
+    assert figures["visible_fraction"] == pytest.approx(0.5)
+    assert figures["tracked_fraction"] == 1
