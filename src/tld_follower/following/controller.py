@@ -26,7 +26,7 @@ class ThesisController:
         self._p = parameters
 
     def command(self, box, distance):
-        """Return the `Command` for a box in pixels and a distance in metres (NaN: keep off the forward axis)."""
+        """Return the `Command` for a box in pixels and a distance in metres (NaN: no forward motion)."""
         p = self._p
         half_width, half_height = p.image_width / 2, p.image_height / 2
         right = box.x + box.width / 2 - half_width

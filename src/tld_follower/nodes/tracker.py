@@ -92,7 +92,7 @@ class TrackerNode:
             self._publish_view(message, box, confidence)
 
     def _learn_requested(self):
-        """Learn the requested target from the newest image; return its box, or None if there was no request."""
+        """Learn the requested target from the newest image; return its box, or None without a request."""
         with self._request_lock:
             box, self._request = self._request, None
         if box is None:
