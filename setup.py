@@ -1,3 +1,5 @@
+"""Python package, for catkin_python_setup."""
+
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
