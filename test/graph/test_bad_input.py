@@ -63,10 +63,7 @@ class Camera:
             picture = (pictures or (self.left, self.right))[i]
             info = infos[i] if infos else self.info(side)
             message = Image(height=picture.shape[0], width=picture.shape[1], encoding=encoding)
-            message.step, message.data = (
-                picture.shape[1] * ((picture.ndim == 3 and 3) or 1),
-                picture.tobytes(),
-            )
+            message.step, message.data = picture[0].nbytes, picture.tobytes()
             for part in (message, info):
                 part.header.stamp, part.header.frame_id = stamp, "stereo_left_optical_frame"
             self._infos[i].publish(info)

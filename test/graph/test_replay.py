@@ -52,7 +52,7 @@ class ReplayTest(unittest.TestCase):
         self.folder = Path(folder.name)
 
     def record(self):
-        """Fly for some seconds with the recorder running from the tracker's first frame on; return the bag."""
+        """Fly for some seconds, recorded from the tracker's first frame on; return the bag."""
         truths, newest = [], []
         rospy.Subscriber("/gazebo/truth", Truth, truths.append)
         rospy.Subscriber("/pointA", BoundingBox, newest.append)
