@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""P-N learning: examples for the detector from one confirmed box (thesis section 3.1.3; Kalal 2012)."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from tld_follower.box import Box
+from tld_follower.tld.detector import Detections, Detector, overlaps
+from tld_follower.tld.ferns import fern_codes
+from tld_follower.tld.frame import Frame
+from tld_follower.tld.parameters import Parameters
+from tld_follower.tld.windows import WindowSize
+
+# Negatives at the start are shown twice, as in Kalal's bootstrap: later ones are then judged by trained ferns.
+INITIAL_ROUNDS = 2
+
+
+class Learner:
+    """Trains a detector by the P-constraint (windows on the target) and the N-constraint (all far from it)."""
+
+    def __init__(self, detector: Detector, parameters: Parameters, rng: np.random.Generator) -> None:
+        self._detector = detector
+        self._parameters = parameters
+        self._rng = rng
+
+    def initialise(self, frame: Frame, box: Box) -> None:
+        """Train on the first frame, and raise both thresholds above half of its background, held out.
+
+        Parameters
+        ----------
+        frame, box : the target's first view [pixel].
+        """
+        parameters, detector, rng = self._parameters, self._detector, self._rng
+        positive = self._warped_codes(frame, box, parameters.initial_warps, parameters.initial_rotation)
+        background = detector.scan(frame, box, parameters.scales, -1.0)
+        far = overlaps(background.boxes, np.array(box.as_tuple())) < parameters.negative_overlap
+        order = rng.permutation(np.flatnonzero(far))
+        training, held_out = order[: len(order) // 2], order[len(order) // 2 :]
+        codes = np.concatenate([positive, background.codes[training]])
+        labels = np.arange(len(codes)) < len(positive)
+        for _ in range(INITIAL_ROUNDS):
+            shuffled = rng.permutation(len(codes))
+            self._train(codes[shuffled], labels[shuffled])
+        if len(held_out):
+            seen = float(detector.ferns.confidence(background.codes[held_out]).max())
+            detector.fern_threshold = max(parameters.fern_threshold, seen)
+
+        model = detector.model
+        model.positives.add(frame.patches(np.array([box.as_tuple()]))[0])
+        chosen = order[: parameters.initial_negatives]
+        patches = frame.patches(background.boxes[chosen])
+        half = (len(patches) + 1) // 2
+        self._add_negatives(patches[:half])
+        if len(patches) > half:
+            seen = float(model.similarity(patches[half:]).relative.max())
+            detector.nn_threshold = max(parameters.nn_threshold, seen)
+        self.update(frame, box, detector.detect(frame, box, parameters.scales))
+
+    def update(self, frame: Frame, box: Box, detections: Detections) -> None:
+        """Train on one frame whose box is trusted.
+
+        The detector's candidates far from the box are negative, the windows nearest to it, warped, positive.
+        """
+        parameters, detector = self._parameters, self._detector
+        far = overlaps(detections.boxes, np.array(box.as_tuple())) < parameters.negative_overlap
+        positive = self._warped_codes(frame, box, parameters.warps, parameters.rotation)
+        codes = np.concatenate([positive, detections.codes[far]])
+        labels = np.arange(len(codes)) < len(positive)
+        shuffled = self._rng.permutation(len(codes))
+        self._train(codes[shuffled], labels[shuffled])
+
+        patch = frame.patches(np.array([box.as_tuple()]))
+        if detector.model.similarity(patch).relative[0] <= detector.nn_threshold:
+            detector.model.positives.add(patch[0])
+        self._add_negatives(detections.patches[far])
+
+    def _train(self, codes: np.ndarray, labels: np.ndarray) -> None:
+        self._detector.ferns.train(
+            codes, labels, self._detector.fern_threshold, self._parameters.fern_threshold
+        )
+
+    def _add_negatives(self, patches: np.ndarray) -> None:
+        """Add those that the model, with the ones before them, takes for the target."""
+        model = self._detector.model
+        remaining = patches
+        while len(remaining):
+            similarity = model.similarity(remaining).relative
+            wrong = similarity > self._parameters.negative_threshold
+            if not wrong.any():
+                return
+            worst = int(np.argmax(similarity))
+            model.negatives.add(remaining[worst])
+            wrong[worst] = False
+            remaining = remaining[wrong]
+
+    def _warped_codes(self, frame: Frame, box: Box, warps: int, rotation: float) -> np.ndarray:
+        """Fern codes of the windows nearest to a box, as they are and in warped views of it.
+
+        Returns
+        -------
+        (N, ferns) int32
+        """
+        groups = self._nearest_windows(frame, box)
+        codes = [np.zeros((0, self._detector.ferns.count), np.int32)]
+        for octave in sorted({size.octave for size, _ in groups}):
+            members = [(size, corners) for size, corners in groups if size.octave == octave]
+            codes.extend(self._octave_codes(frame, box, members, warps, rotation))
+        return np.concatenate(codes)
+
+    def _octave_codes(
+        self, frame: Frame, box: Box, groups: list[tuple[WindowSize, np.ndarray]], warps: int, rotation: float
+    ) -> list[np.ndarray]:
+        parameters, rng = self._parameters, self._rng
+        octave, factor = groups[0][0].octave, groups[0][0].factor
+        level = frame.level(octave)
+        # The crop holds all windows and the reach of the blur about them.
+        reach = int(np.ceil(2.0 * parameters.blur))
+        low = np.min([corners.min(axis=0) for _, corners in groups], axis=0) - reach
+        high = np.max([c.max(axis=0) + [round(s.grid[0]), round(s.grid[1])] for s, c in groups], axis=0) + reach
+        x0, y0 = np.maximum(low, 0)
+        x1, y1 = np.minimum(high, [level.gray.shape[1], level.gray.shape[0]])
+        crop = level.gray[y0:y1, x0:x1]
+        local = [(np.ascontiguousarray(c - [x0, y0], np.int32), s.offsets) for s, c in groups]
+        center = np.array(box.center) / factor - [x0, y0] - 0.5
+        extent = np.array([box.width, box.height]) / factor
+        codes = [fern_codes(level.blurred[y0:y1, x0:x1], c, o) for c, o in local]
+        for _ in range(warps):
+            angle = rng.uniform(-rotation, rotation)
+            scale = 1.0 + rng.uniform(-parameters.warp_scale, parameters.warp_scale)
+            matrix = cv2.getRotationMatrix2D(center.tolist(), angle, scale)
+            matrix[:, 2] += rng.uniform(-parameters.warp_shift, parameters.warp_shift, 2) * extent
+            view = cv2.warpAffine(crop, matrix, crop.shape[::-1], borderMode=cv2.BORDER_REPLICATE)
+            noise = rng.standard_normal(crop.shape, np.float32) * np.float32(parameters.warp_noise)
+            noisy = cv2.add(view, noise, dtype=cv2.CV_8U)
+            blurred = cv2.GaussianBlur(noisy, (0, 0), parameters.blur)
+            codes.extend(fern_codes(blurred, c, o) for c, o in local)
+        return codes
+
+    def _nearest_windows(self, frame: Frame, box: Box) -> list[tuple[WindowSize, np.ndarray]]:
+        """Find the `positive_windows` windows that overlap a box most, at least by `positive_overlap`.
+
+        Returns
+        -------
+        pairs of a size and its windows' corners (N, 2) int32 in its level.
+        """
+        parameters = self._parameters
+        target = np.array(box.as_tuple())
+        found = []
+        for size in self._detector.sizes:
+            ratio = size.width * size.height / box.area
+            if min(ratio, 1.0 / ratio) < parameters.positive_overlap:
+                continue
+            corners = _corners_near(size, box, frame)
+            shared = overlaps(size.boxes(corners), target)
+            found.append((size, corners, shared))
+        if not found:
+            return []
+        everything = np.concatenate([shared for _, _, shared in found])
+        if len(everything) == 0:
+            return []
+        rank = min(parameters.positive_windows, len(everything))
+        limit = max(np.partition(everything, -rank)[-rank], parameters.positive_overlap)
+        groups = [(size, corners[shared >= limit]) for size, corners, shared in found]
+        return [(size, corners) for size, corners in groups if len(corners)]
+
+
+def _corners_near(size: WindowSize, box: Box, frame: Frame) -> np.ndarray:
+    """Corners (N, 2) int32 of the windows of one size whose corner is within half a box of the box's."""
+    width, height, step_x, step_y = size.grid
+    limits = (
+        (box.x, box.width, step_x, frame.width // size.factor - round(width)),
+        (box.y, box.height, step_y, frame.height // size.factor - round(height)),
+    )
+    axes = []
+    for start, side, step, last in limits:
+        first = max(0, int(np.ceil((start - 0.5 * side) / size.factor / step)))
+        final = int((start + 0.5 * side) / size.factor / step)
+        positions = np.rint(np.arange(first, final + 1) * step).astype(np.int32)
+        axes.append(positions[positions <= last])
+    x, y = np.meshgrid(*axes)
+    return np.stack([x.ravel(), y.ravel()], axis=1)

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Parameters of the tracker. config/tracker.yaml documents the same names for ROS users."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+TRACKERS = ("tld", "tld_sift")
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Everything that can be tuned. Lengths are in pixels, similarities and probabilities 0..1."""
+
+    tracker: str = "tld"
+    learning: bool = True
+    min_side: float = 8.0
+
+    grid_points: int = 10
+    lk_window: int = 9
+    lk_levels: int = 3
+    flow_side: float = 96.0
+    flow_patch: int = 10
+    max_fb_error: float = 0.15
+
+    scale_step: float = 1.2
+    shift: float = 0.1
+    scales: int = 10
+    tracking_scales: int = 4
+    window_side: float = 24.0
+    max_windows: int = 60000
+
+    variance_ratio: float = 0.5
+    ferns: int = 10
+    comparisons: int = 13
+    blur: float = 3.0
+    fern_threshold: float = 0.5
+    max_candidates: int = 100
+
+    nn_threshold: float = 0.65
+    valid_threshold: float = 0.7
+    lost_threshold: float = 0.5
+    negative_threshold: float = 0.5
+    max_positives: int = 200
+    max_negatives: int = 300
+
+    positive_windows: int = 10
+    positive_overlap: float = 0.6
+    negative_overlap: float = 0.2
+    initial_warps: int = 20
+    initial_rotation: float = 10.0
+    warps: int = 10
+    rotation: float = 5.0
+    warp_scale: float = 0.01
+    warp_shift: float = 0.01
+    warp_noise: float = 5.0
+    initial_negatives: int = 100
+
+    takeover_overlap: float = 0.5
+    fusion_overlap: float = 0.7
+    fusion_weight: float = 10.0
+
+    sift_keypoints: int = 200
+    sift_side: float = 400.0
+    sift_views: int = 10
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            kind = type(field.default)
+            if kind is float and type(value) is int:
+                object.__setattr__(self, field.name, float(value))
+            elif type(value) is not kind:
+                raise ValueError(f"parameter {field.name} must be of type {kind.__name__}, got {value!r}")
+            elif kind in (int, float) and not value > 0:
+                raise ValueError(f"parameter {field.name} must be positive, got {value!r}")
+        if self.tracker not in TRACKERS:
+            raise ValueError(f"parameter tracker must be one of {', '.join(TRACKERS)}, got {self.tracker!r}")
+        if self.scale_step <= 1.0:
+            raise ValueError(f"parameter scale_step must exceed 1, got {self.scale_step}")
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Parameters:
+        """Build from a mapping of names to values; the rest keep their defaults.
+
+        Raises
+        ------
+        ValueError
+            For an unknown name, a value of the wrong type or one outside its range.
+        """
+        unknown = sorted(set(values) - {field.name for field in fields(cls)})
+        if unknown:
+            raise ValueError(f"unknown tracker parameter: {', '.join(unknown)}")
+        return cls(**values)
