@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stereo/image.h"
+
+#include <array>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+
+namespace tld_stereo {
+namespace {
+
+// OpenCV names a Bayer pattern by the second row's second and third pixel, ROS by the first row.
+struct EncodingTraits {
+  const char* name;
+  int channels;
+  int to_grey, to_bgr;  // cv::ColorConversionCodes, -1: nothing to convert
+};
+constexpr std::array<EncodingTraits, 7> kTraits{{
+    {"mono8", 1, -1, -1},
+    {"bgr8", 3, cv::COLOR_BGR2GRAY, -1},
+    {"rgb8", 3, cv::COLOR_RGB2GRAY, -1},
+    {"bayer_rggb8", 1, cv::COLOR_BayerBG2GRAY, cv::COLOR_BayerBG2BGR},
+    {"bayer_bggr8", 1, cv::COLOR_BayerRG2GRAY, cv::COLOR_BayerRG2BGR},
+    {"bayer_gbrg8", 1, cv::COLOR_BayerGR2GRAY, cv::COLOR_BayerGR2BGR},
+    {"bayer_grbg8", 1, cv::COLOR_BayerGB2GRAY, cv::COLOR_BayerGB2BGR},
+}};
+
+const EncodingTraits& traits(Encoding encoding) { return kTraits[static_cast<size_t>(encoding)]; }
+
+cv::Mat convert(const cv::Mat& raw, int code, cv::Mat& buffer) {
+  if (code < 0) return raw;
+  cv::cvtColor(raw, buffer, code);
+  return buffer;
+}
+
+}  // namespace
+
+Encoding parseEncoding(const std::string& name) {
+  for (size_t i = 0; i < kTraits.size(); ++i) {
+    if (name == kTraits[i].name) return static_cast<Encoding>(i);
+  }
+  throw std::invalid_argument("image encoding '" + name +
+                              "' is not one of mono8, bgr8, rgb8, bayer_{rggb,bggr,gbrg,grbg}8");
+}
+
+int channels(Encoding encoding) { return traits(encoding).channels; }
+
+cv::Mat toGrey(const cv::Mat& raw, Encoding encoding, cv::Mat& buffer) {
+  return convert(raw, traits(encoding).to_grey, buffer);
+}
+
+Texture toTexture(const cv::Mat& raw, Encoding encoding, cv::Mat& buffer) {
+  return {convert(raw, traits(encoding).to_bgr, buffer), encoding == Encoding::kRgb};
+}
+
+}  // namespace tld_stereo

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "stereo/stereo_node.h"
+
+#include <message_filters/sync_policies/approximate_time.h>
+#include <message_filters/sync_policies/exact_time.h>
+#include <message_filters/synchronizer.h>
+#include <pcl_conversions/pcl_conversions.h>
+#include <ros/master.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <boost/bind/bind.hpp>
+#include <exception>
+#include <stdexcept>
+
+namespace tld_stereo {
+namespace {
+
+using sensor_msgs::CameraInfo;
+using sensor_msgs::Image;
+using ExactTime = message_filters::sync_policies::ExactTime<Image, CameraInfo, Image, CameraInfo>;
+using ApproximateTime =
+    message_filters::sync_policies::ApproximateTime<Image, CameraInfo, Image, CameraInfo>;
+
+constexpr double kCheckPeriod = 5;  // s, wall time
+constexpr std::chrono::seconds kSameWarningPeriod{10};
+constexpr uint32_t kNewestOnly = 1;  // a queue of more would only make pairs older under load
+
+// Shares the message's bytes; OpenCV has no constant views, nothing writes to this one.
+cv::Mat toMat(const Image& image, Encoding encoding) {
+  const size_t row = static_cast<size_t>(image.width) * channels(encoding);
+  if (row == 0 || image.height == 0) throw std::invalid_argument("the image is empty");
+  if (image.step < row || image.data.size() < static_cast<size_t>(image.step) * image.height) {
+    throw std::invalid_argument("the image has fewer bytes than its size and encoding ask for");
+  }
+  return cv::Mat(image.height, image.width, CV_8UC(channels(encoding)),
+                 const_cast<uint8_t*>(image.data.data()), image.step);
+}
+
+// The calibration in pixels of the image: full-resolution camera_info, moved to the region of
+// interest and divided by the binning.
+Calibration toCalibration(const CameraInfo& info) {
+  const double bin_x = std::max(1u, info.binning_x), bin_y = std::max(1u, info.binning_y);
+  const auto& roi = info.roi;
+  const cv::Matx33d window(1 / bin_x, 0, -(roi.x_offset / bin_x), 0, 1 / bin_y,
+                           -(roi.y_offset / bin_y), 0, 0, 1);
+  Calibration calibration;
+  calibration.size = cv::Size(static_cast<int>((roi.width ? roi.width : info.width) / bin_x),
+                              static_cast<int>((roi.height ? roi.height : info.height) / bin_y));
+  calibration.distortion_model = info.distortion_model;
+  calibration.d = info.D;
+  calibration.k = window * cv::Matx33d(info.K.data());
+  calibration.r = cv::Matx33d(info.R.data());
+  calibration.p = window * cv::Matx34d(info.P.data());
+  return calibration;
+}
+
+MatcherParameters toParameters(const tld_follower::StereoConfig& config) {
+  MatcherParameters parameters;
+  parameters.algorithm = static_cast<Algorithm>(config.stereo_algorithm);
+  parameters.prefilter_cap = config.prefilter_cap;
+  parameters.correlation_window_size = config.correlation_window_size;
+  parameters.min_disparity = config.min_disparity;
+  parameters.disparity_range = config.disparity_range;
+  parameters.uniqueness_ratio = config.uniqueness_ratio;
+  parameters.texture_threshold = config.texture_threshold;
+  parameters.speckle_size = config.speckle_size;
+  parameters.speckle_range = config.speckle_range;
+  parameters.full_dp = config.fullDP;
+  parameters.p1 = config.P1;
+  parameters.p2 = config.P2;
+  parameters.disp12_max_diff = config.disp12MaxDiff;
+  return parameters;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+StereoNode::StereoNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+    : nh_(nh),
+      transport_(nh),
+      hints_("raw", ros::TransportHints().tcpNoDelay(), private_nh),
+      queue_size_(std::max(1, private_nh.param("queue_size", 5))),
+      approximate_(private_nh.param("approximate_sync", false)),
+      reconfigure_server_(private_nh) {
+  approximate_ ? synchronise<ApproximateTime>() : synchronise<ExactTime>();
+  images_[0].registerCallback([this](const ImagePtr&) { ++received_[0]; });
+  infos_[0].registerCallback([this](const InfoPtr&) { ++received_[1]; });
+  images_[1].registerCallback([this](const ImagePtr&) { ++received_[2]; });
+  infos_[1].registerCallback([this](const InfoPtr&) { ++received_[3]; });
+
+  reconfigure_server_.setCallback(
+      [this](tld_follower::StereoConfig& config, uint32_t) { reconfigure(config); });
+  const auto changed = [this](const ros::SingleSubscriberPublisher&) { subscribeWhileNeeded(); };
+  disparity_publisher_ =
+      nh_.advertise<stereo_msgs::DisparityImage>("disparity", kNewestOnly, changed, changed);
+  cloud_publisher_ =
+      nh_.advertise<sensor_msgs::PointCloud2>("points2", kNewestOnly, changed, changed);
+  input_timer_ = nh_.createWallTimer(ros::WallDuration(kCheckPeriod),
+                                     [this](const ros::WallTimerEvent&) { checkInputs(); });
+}
+
+template <typename Policy>
+void StereoNode::synchronise() {
+  using namespace boost::placeholders;
+  auto synchroniser = std::make_shared<message_filters::Synchronizer<Policy>>(
+      Policy(queue_size_), images_[0], infos_[0], images_[1], infos_[1]);
+  synchroniser->registerCallback(boost::bind(&StereoNode::receive, this, _1, _2, _3, _4));
+  synchroniser_ = synchroniser;
+}
+
+void StereoNode::subscribeWhileNeeded() {
+  const bool needed =
+      disparity_publisher_.getNumSubscribers() + cloud_publisher_.getNumSubscribers() > 0;
+  if (needed == subscribed_) return;
+  subscribed_ = needed;
+  received_ = {};
+  pairs_ = 0;
+  if (!needed) {
+    for (auto& image : images_) image.unsubscribe();
+    for (auto& info : infos_) info.unsubscribe();
+    return;
+  }
+  images_[0].subscribe(transport_, "left/image_raw", kNewestOnly, hints_);
+  infos_[0].subscribe(nh_, "left/camera_info", kNewestOnly, hints_.getRosHints());
+  images_[1].subscribe(transport_, "right/image_raw", kNewestOnly, hints_);
+  infos_[1].subscribe(nh_, "right/camera_info", kNewestOnly, hints_.getRosHints());
+  input_timer_.stop();  // a whole period from now on
+  input_timer_.start();
+}
+
+void StereoNode::reconfigure(tld_follower::StereoConfig& config) {
+  matcher_.setParameters(toParameters(config));
+  // The client is shown what is in force.
+  config.prefilter_size |= 1;
+  config.correlation_window_size = matcher_.parameters().correlation_window_size;
+  config.disparity_range = matcher_.parameters().disparity_range;
+}
+
+void StereoNode::receive(const ImagePtr& left, const InfoPtr& left_info, const ImagePtr& right,
+                         const InfoPtr& right_info) {
+  ++pairs_;
+  try {
+    process(*left, *left_info, *right, *right_info);
+  } catch (const std::exception& error) {
+    warn(std::string("no disparity for this pair: ") + error.what());
+  }
+}
+
+void StereoNode::process(const Image& left, const CameraInfo& left_info, const Image& right,
+                         const CameraInfo& right_info) {
+  const Calibration left_calibration = toCalibration(left_info);
+  const Calibration right_calibration = toCalibration(right_info);
+  const auto geometry = StereoGeometry::from(left_calibration, right_calibration);
+
+  const Encoding left_encoding = parseEncoding(left.encoding);
+  const Encoding right_encoding = parseEncoding(right.encoding);
+  const cv::Mat left_raw = toMat(left, left_encoding);
+  const cv::Mat right_raw = toMat(right, right_encoding);
+
+  const cv::Mat left_grey =
+      left_.grey_rectifier.rectify(toGrey(left_raw, left_encoding, left_.grey), left_calibration);
+  const cv::Mat right_grey = right_.grey_rectifier.rectify(
+      toGrey(right_raw, right_encoding, right_.grey), right_calibration);
+  const cv::Mat& disparity = matcher_.match(left_grey, right_grey);
+
+  if (cloud_publisher_.getNumSubscribers() > 0) {
+    Texture texture{left_grey};
+    if (left_encoding != Encoding::kMono) {
+      texture = toTexture(left_raw, left_encoding, left_.texture);
+      texture.pixels = left_.texture_rectifier.rectify(texture.pixels, left_calibration);
+    }
+    publishCloud(disparity, texture, geometry, left.header);
+  }
+  if (disparity_publisher_.getNumSubscribers() > 0) {
+    publishDisparity(disparity, geometry, left.header);
+  }
+}
+
+void StereoNode::publishDisparity(const cv::Mat& disparity, const StereoGeometry& geometry,
+                                  const std_msgs::Header& header) {
+  auto& message = disparity_message_;
+  message.header = message.image.header = header;
+  message.image.height = disparity.rows;
+  message.image.width = disparity.cols;
+  message.image.encoding = sensor_msgs::image_encodings::TYPE_32FC1;
+  message.image.step = disparity.cols * sizeof(float);
+  message.image.data.resize(static_cast<size_t>(message.image.step) * disparity.rows);
+  cv::Mat pixels(disparity.size(), CV_32FC1, message.image.data.data(), message.image.step);
+  toPixels(disparity, geometry.offset, pixels);
+
+  const auto& parameters = matcher_.parameters();
+  message.f = static_cast<float>(geometry.fx);
+  message.T = static_cast<float>(geometry.baseline);
+  message.min_disparity = static_cast<float>(parameters.min_disparity - geometry.offset);
+  message.max_disparity = message.min_disparity + parameters.disparity_range - 1;
+  message.delta_d = 1.0f / kSteps;
+  const cv::Rect window = matcher_.validWindow(disparity.size());
+  message.valid_window.x_offset = window.x;
+  message.valid_window.y_offset = window.y;
+  message.valid_window.width = window.width;
+  message.valid_window.height = window.height;
+  disparity_publisher_.publish(message);
+}
+
+void StereoNode::publishCloud(const cv::Mat& disparity, const Texture& texture,
+                              const StereoGeometry& geometry, const std_msgs::Header& header) {
+  // The bytes move from the last message to PCL and back: no copy, no new memory.
+  pcl::PCLPointCloud2 cloud;
+  pcl_conversions::moveToPCL(cloud_message_, cloud);
+  cloud_maker_.make(disparity, matcher_.parameters().min_disparity, texture, geometry, cloud);
+  pcl_conversions::moveFromPCL(cloud, cloud_message_);
+  cloud_message_.header = header;  // PCL's own stamp has microseconds only
+  cloud_publisher_.publish(cloud_message_);
+}
+
+void StereoNode::checkInputs() {
+  const ros::Time now = ros::Time::now();
+  const bool clock_stands = ros::Time::isSimTime() && !now.isZero() && now == last_check_;
+  last_check_ = now;
+  const auto received = received_;
+  const int pairs = pairs_;
+  received_ = {};
+  pairs_ = 0;
+  // A simulation at pause owes no images.
+  if (!subscribed_ || pairs > 0 || clock_stands) return;
+
+  const std::array<std::string, 4> topics{images_[0].getTopic(), infos_[0].getTopic(),
+                                          images_[1].getTopic(), infos_[1].getTopic()};
+  const std::array<uint32_t, 4> publishers{
+      images_[0].getNumPublishers(), infos_[0].getSubscriber().getNumPublishers(),
+      images_[1].getNumPublishers(), infos_[1].getSubscriber().getNumPublishers()};
+  std::vector<std::string> unpublished, silent;
+  for (size_t i = 0; i < topics.size(); ++i) {
+    if (received[i] == 0) (publishers[i] == 0 ? unpublished : silent).push_back(topics[i]);
+  }
+  if (!unpublished.empty()) {
+    warn("no disparity: nobody publishes " + joined(unpublished) +
+         " (are the cameras running, and in the namespace " + nh_.getNamespace() + "?)");
+  } else if (!silent.empty()) {
+    warn("no disparity: nothing arrives on " + joined(silent) + " (check with: rostopic hz)");
+  } else {
+    warn("no disparity: images and camera_info arrive, but none of them pair up; " +
+         std::string(approximate_ ? "their stamps are too far apart for queue_size"
+                                  : "their stamps must be identical, else set approximate_sync"));
+  }
+}
+
+void StereoNode::warn(const std::string& text) {
+  const auto now = std::chrono::steady_clock::now();
+  if (text == last_warning_ && now - last_warning_time_ < kSameWarningPeriod) return;
+  last_warning_ = text;
+  last_warning_time_ = now;
+  ROS_WARN_STREAM(text);
+}
+
+}  // namespace tld_stereo
