@@ -123,7 +123,10 @@ def table(runs):
 
 def write_report(result, directory, drive_s):
     """Write the plots; return their paths."""
-    title = f"{result['scenario']}: {result['control']} control, distance from {result['distance']}, at most {result['max_speed']} m/s"
+    title = (
+        f"{result['scenario']}: {result['control']} control, distance from {result['distance']}, "
+        f"at most {result['max_speed']} m/s"
+    )
     distance, velocity = directory / "distance.png", directory / "velocity.png"
     plots.plot_distance(result["runs"], drive_s, title, distance)
     plots.plot_velocity(result["runs"][0], drive_s, title, velocity)

@@ -19,8 +19,8 @@ FRAME_TIMEOUT = 60.0  # s of wall-clock time
 class Flight:
     """The driver and scorer of a simulation in lockstep that waits for /husky/cmd_vel as well as /cmd_vel.
 
-    It answers every frame once truth, box and follower state (and the image, if watched) of the frame are here,
-    so that every run of a seed sees the same commands at the same frames.
+    It answers every frame once truth, box and follower state (and the image, if watched) of that frame are
+    here, so that every run of a seed sees the same commands at the same frames.
     """
 
     def __init__(self, on_image=None):

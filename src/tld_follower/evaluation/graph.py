@@ -33,7 +33,7 @@ class GraphError(RuntimeError):
 
 
 def edges():
-    """Return the connections that are up: a set of (publisher, topic, subscriber), as the publishers see them."""
+    """Return the connections that are up, a set of (publisher, topic, subscriber)."""
     publishers, subscribers, _ = rosgraph.Master(_CALLER).getSystemState()
     nodes = {node for _, names in [*publishers, *subscribers] for node in names}
     found = set()

@@ -12,7 +12,7 @@ def _between(t, first, last):
 
 
 def _episodes(visible):
-    """Indices where a run of False begins after a True, and where it ends again (None: never)."""
+    """Find where runs of False begin after a True, and where each ends again (None: never)."""
     lost = [i for i in range(1, len(visible)) if visible[i - 1] and not visible[i]]
     return [(i, next((j for j in range(i, len(visible)) if visible[j]), None)) for i in lost]
 

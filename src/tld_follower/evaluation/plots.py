@@ -5,11 +5,11 @@ import matplotlib
 import numpy as np
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+import matplotlib.pyplot as plt
 
-from tld_follower.evaluation.metrics import SET_DISTANCE  # noqa: E402
-from tld_follower.following.follower import Mode  # noqa: E402
-from tld_follower.nodes.conversions import image_array, message_box  # noqa: E402
+from tld_follower.evaluation.metrics import SET_DISTANCE
+from tld_follower.following.follower import Mode
+from tld_follower.nodes.conversions import image_array, message_box
 
 TRUTH, FOUND, INK = "#5b6770", "#d1495b", "#222222"
 _FRAME_STEP = 2  # every second frame goes into the video

@@ -7,7 +7,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Scenario:
-    """A flight: the target rests, is boxed at `box_at`, drives from `start` to `halt`, and is watched to `end`.
+    """A flight: the target rests, is boxed at `box_at`, drives from `start` to `halt`; ends at `end`.
 
     All times are seconds of simulated time since the start of the simulation.
     """
