@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sim/parameters_node.h"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace tld_follower::sim {
+namespace {
+
+[[noreturn]] void Fail(const std::string& name, const std::string& what) {
+  throw std::invalid_argument("parameter ~" + name + " must be " + what);
+}
+
+template <typename T>
+void Read(const ros::NodeHandle& handle, const std::string& name, const std::string& what,
+          T* value) {
+  if (handle.hasParam(name) && !handle.getParam(name, *value)) Fail(name, what);
+}
+
+void ReadFinite(const ros::NodeHandle& handle, const std::string& name, double* value) {
+  Read(handle, name, "a number", value);
+  if (!std::isfinite(*value)) Fail(name, "finite");
+}
+
+void ReadPositive(const ros::NodeHandle& handle, const std::string& name, double* value) {
+  ReadFinite(handle, name, value);
+  if (!(*value > 0)) Fail(name, "positive");
+}
+
+void ReadNotNegative(const ros::NodeHandle& handle, const std::string& name, double* value) {
+  ReadFinite(handle, name, value);
+  if (*value < 0) Fail(name, "0 or more");
+}
+
+void ReadPlacement(const ros::NodeHandle& handle, const std::string& name,
+                   std::optional<Placement>* place) {
+  const std::string what = "a list [x, y, yaw] in m and rad, or empty";
+  std::vector<double> numbers;
+  Read(handle, name, what, &numbers);
+  if (numbers.empty()) return;
+  if (numbers.size() != 3) Fail(name, what);
+  for (const double number : numbers) {
+    if (!std::isfinite(number)) Fail(name, what);
+  }
+  *place = Placement{numbers[0], numbers[1], numbers[2]};
+}
+
+void ReadCamera(const ros::NodeHandle& handle, StereoCamera* camera) {
+  Read(handle, "width", "a whole number", &camera->width);
+  Read(handle, "height", "a whole number", &camera->height);
+  ReadPositive(handle, "hfov", &camera->hfov);
+  ReadPositive(handle, "baseline", &camera->baseline);
+  ReadFinite(handle, "camera_pitch", &camera->pitch);
+  std::vector<double> position;
+  const std::string what = "a list [x, y, z] in m";
+  Read(handle, "camera_position", what, &position);
+  if (position.empty()) return;
+  if (position.size() != 3) Fail("camera_position", what);
+  camera->position = {btScalar(position[0]), btScalar(position[1]), btScalar(position[2])};
+}
+
+void ReadSpiri(const ros::NodeHandle& handle, SpiriParameters* p) {
+  ReadPositive(handle, "spiri/arm", &p->arm);
+  ReadPositive(handle, "spiri/motor_constant", &p->motor_constant);
+  ReadPositive(handle, "spiri/moment_constant", &p->moment_constant);
+  ReadPositive(handle, "spiri/max_rotor_speed", &p->max_rotor_speed);
+  ReadPositive(handle, "spiri/time_constant_up", &p->time_constant_up);
+  ReadPositive(handle, "spiri/time_constant_down", &p->time_constant_down);
+  ReadNotNegative(handle, "spiri/drag_xy", &p->drag_xy);
+  ReadNotNegative(handle, "spiri/drag_z", &p->drag_z);
+  ReadNotNegative(handle, "spiri/drag_roll_pitch", &p->drag_roll_pitch);
+  ReadNotNegative(handle, "spiri/drag_yaw", &p->drag_yaw);
+  ReadNotNegative(handle, "spiri/velocity_xy_p", &p->velocity_xy_p);
+  ReadNotNegative(handle, "spiri/velocity_xy_i", &p->velocity_xy_i);
+  ReadNotNegative(handle, "spiri/velocity_z_p", &p->velocity_z_p);
+  ReadNotNegative(handle, "spiri/velocity_z_i", &p->velocity_z_i);
+  ReadNotNegative(handle, "spiri/position_p", &p->position_p);
+  ReadNotNegative(handle, "spiri/attitude_p", &p->attitude_p);
+  ReadNotNegative(handle, "spiri/attitude_d", &p->attitude_d);
+  ReadNotNegative(handle, "spiri/heading_p", &p->heading_p);
+  ReadNotNegative(handle, "spiri/yaw_rate_p", &p->yaw_rate_p);
+  ReadPositive(handle, "spiri/max_tilt", &p->max_tilt);
+  ReadNotNegative(handle, "spiri/max_speed_xy", &p->max_speed_xy);
+  ReadNotNegative(handle, "spiri/max_speed_z", &p->max_speed_z);
+  ReadNotNegative(handle, "spiri/max_yaw_rate", &p->max_yaw_rate);
+  ReadPositive(handle, "spiri/command_timeout", &p->command_timeout);
+  ReadPositive(handle, "spiri/take_off_speed", &p->take_off_speed);
+  ReadPositive(handle, "take_off_altitude", &p->take_off_altitude);
+}
+
+void ReadSensors(const ros::NodeHandle& handle, SensorParameters* p) {
+  ReadNotNegative(handle, "spiri/sensors/acceleration_noise", &p->acceleration_noise);
+  ReadNotNegative(handle, "spiri/sensors/gyroscope_noise", &p->gyroscope_noise);
+  ReadNotNegative(handle, "spiri/sensors/gyroscope_drift", &p->gyroscope_drift);
+  ReadNotNegative(handle, "spiri/sensors/range_noise", &p->range_noise);
+  ReadPositive(handle, "spiri/sensors/range_max", &p->range_max);
+  ReadNotNegative(handle, "spiri/sensors/tilt_noise", &p->tilt_noise);
+  ReadNotNegative(handle, "spiri/sensors/velocity_noise", &p->velocity_noise);
+  ReadNotNegative(handle, "spiri/sensors/velocity_drift", &p->velocity_drift);
+  ReadNotNegative(handle, "spiri/sensors/altitude_noise", &p->altitude_noise);
+  ReadNotNegative(handle, "spiri/sensors/yaw_rate_drift", &p->yaw_rate_drift);
+  ReadPositive(handle, "spiri/sensors/drift_time", &p->drift_time);
+}
+
+void ReadHusky(const ros::NodeHandle& handle, HuskyParameters* p) {
+  ReadPositive(handle, "husky/separation_multiplier", &p->separation_multiplier);
+  ReadNotNegative(handle, "husky/max_speed", &p->max_speed);
+  ReadPositive(handle, "husky/max_acceleration", &p->max_acceleration);
+  ReadNotNegative(handle, "husky/max_yaw_rate", &p->max_yaw_rate);
+  ReadPositive(handle, "husky/max_yaw_acceleration", &p->max_yaw_acceleration);
+  ReadPositive(handle, "husky/command_timeout", &p->command_timeout);
+  ReadPositive(handle, "husky/max_wheel_torque", &p->max_wheel_torque);
+}
+
+Mode ReadMode(const ros::NodeHandle& handle) {
+  std::string mode = "realtime";
+  Read(handle, "mode", "realtime, fast or lockstep", &mode);
+  if (mode == "realtime") return Mode::kRealtime;
+  if (mode == "fast") return Mode::kFast;
+  if (mode == "lockstep") return Mode::kLockstep;
+  Fail("mode", "realtime, fast or lockstep, not '" + mode + "'");
+}
+
+}  // namespace
+
+NodeParameters ReadParameters(const ros::NodeHandle& handle) {
+  NodeParameters result;
+  SimulationConfig& simulation = result.simulation;
+  Read(handle, "world", "the path of an SDF world", &simulation.world_file);
+  if (simulation.world_file.empty()) Fail("world", "the path of an SDF world");
+  result.mode = ReadMode(handle);
+  Read(handle, "paused", "true or false", &result.paused);
+  Read(handle, "lockstep_target", "true or false", &result.lockstep_target);
+  ReadPositive(handle, "lockstep_timeout", &result.lockstep_timeout);
+  int seed = 0;
+  Read(handle, "seed", "a whole number", &seed);
+  simulation.seed = uint64_t(int64_t(seed));
+  ReadPositive(handle, "rate", &simulation.frame_rate);
+  ReadNotNegative(handle, "image_noise", &simulation.image_noise);
+  ReadPlacement(handle, "spiri_pose", &simulation.spiri_place);
+  ReadPlacement(handle, "husky_pose", &simulation.husky_place);
+  ReadCamera(handle, &simulation.camera);
+  ReadSpiri(handle, &simulation.spiri);
+  ReadSensors(handle, &simulation.sensors);
+  ReadHusky(handle, &simulation.husky);
+  return result;
+}
+
+}  // namespace tld_follower::sim

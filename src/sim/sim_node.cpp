@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sim/sim_node.h"
+
+#include <algorithm>
+
+namespace tld_follower::sim {
+namespace {
+
+const ros::WallDuration kIdle(0.01);   // How long a paused loop sleeps.
+const ros::WallDuration kPoll(0.001);  // How long a waiting loop goes without serving services.
+constexpr double kSlipWarningPeriod = 5.0;  // [s]
+
+void Warn(const std::string& message) { ROS_WARN_STREAM(message); }
+
+}  // namespace
+
+SimNode::SimNode()
+    : private_handle_("~"),
+      parameters_(ReadParameters(private_handle_)),
+      simulation_(parameters_.simulation, Warn),
+      publishers_(handle_, private_handle_, simulation_),
+      paused_(parameters_.paused) {
+  handle_.setCallbackQueue(&commands_);
+  const auto no_delay = ros::TransportHints().tcpNoDelay();
+  command_ = handle_.subscribe("cmd_vel", 10, &SimNode::OnCommand, this, no_delay);
+  target_command_ =
+      handle_.subscribe("husky/cmd_vel", 10, &SimNode::OnTargetCommand, this, no_delay);
+  pause_ = private_handle_.advertiseService("pause_physics", &SimNode::OnPause, this);
+  unpause_ = private_handle_.advertiseService("unpause_physics", &SimNode::OnUnpause, this);
+  reset_world_ = private_handle_.advertiseService("reset_world", &SimNode::OnResetWorld, this);
+  reset_simulation_ =
+      private_handle_.advertiseService("reset_simulation", &SimNode::OnResetSimulation, this);
+  step_ = private_handle_.advertiseService("step", &SimNode::OnStep, this);
+  publishers_.PublishStart(simulation_, Stamp());
+  RestartTime();
+  ROS_INFO("%s, %d triangles, %dx%d, %s", parameters_.simulation.world_file.c_str(),
+           simulation_.triangles(), simulation_.camera().width, simulation_.camera().height,
+           paused_ ? "paused" : "running");
+}
+
+void SimNode::Run() {
+  ros::CallbackQueue& services = *ros::getGlobalCallbackQueue();
+  while (ros::ok()) {
+    services.callAvailable(paused_ ? kIdle : ros::WallDuration(0));
+    commands_.callAvailable();
+    if (paused_) continue;
+    if (WaitsForCommands()) {
+      commands_.callAvailable(kPoll);
+      continue;
+    }
+    const double ahead = SecondsAhead();
+    if (ahead > 0) {
+      commands_.callAvailable(ros::WallDuration(std::min(ahead, kIdle.toSec())));
+      continue;
+    }
+    Advance();
+  }
+}
+
+ros::Time SimNode::Stamp() const {
+  ros::Time stamp;
+  stamp.fromNSec(uint64_t(start_ns_ + simulation_.time_ns()));
+  return stamp;
+}
+
+void SimNode::Advance() {
+  const Moment moment = simulation_.Advance();
+  publishers_.Publish(&simulation_, moment, Stamp());
+  if (moment.frame && parameters_.mode == Mode::kLockstep) {
+    waiting_ = true;
+    commanded_ = target_commanded_ = false;
+    frame_published_ = ros::WallTime::now();
+  }
+}
+
+// The answer to a frame is one command for the drone and, if so asked, one for the target.
+bool SimNode::WaitsForCommands() {
+  if (!waiting_) return false;
+  if (commanded_ && (target_commanded_ || !parameters_.lockstep_target)) {
+    waiting_ = false;
+  } else if ((ros::WallTime::now() - frame_published_).toSec() > parameters_.lockstep_timeout) {
+    waiting_ = false;
+    ROS_WARN("lockstep: no %s answered frame %lu within %.1f s; going on without",
+             commanded_ ? "/husky/cmd_vel" : "/cmd_vel",
+             static_cast<unsigned long>(simulation_.frame()), parameters_.lockstep_timeout);
+  }
+  return waiting_;
+}
+
+// How long the wall clock has to catch up with the simulation [s]; moves the anchor where the
+// simulation is late, since frames are never skipped to make up for it.
+double SimNode::SecondsAhead() {
+  if (parameters_.mode != Mode::kRealtime) return 0;
+  const ros::WallTime now = ros::WallTime::now();
+  const double ahead = (simulation_.time() - anchor_time_) - (now - anchor_wall_).toSec();
+  if (ahead > -1.0 / parameters_.simulation.frame_rate) return ahead;
+  anchor_time_ = simulation_.time();
+  anchor_wall_ = now;
+  if ((now - last_slip_warning_).toSec() > kSlipWarningPeriod) {
+    last_slip_warning_ = now;
+    ROS_WARN("slower than real time: %.0f ms late, real-time factor %.2f", -1e3 * ahead,
+             publishers_.real_time_factor());
+  }
+  return 0;
+}
+
+void SimNode::RestartTime() {
+  anchor_time_ = simulation_.time();
+  anchor_wall_ = ros::WallTime::now();
+  publishers_.RestartStopwatch();
+}
+
+void SimNode::OnCommand(const geometry_msgs::Twist& twist) {
+  commanded_ = true;
+  const btVector3 velocity(btScalar(twist.linear.x), btScalar(twist.linear.y),
+                           btScalar(twist.linear.z));
+  if (!simulation_.spiri().Command(velocity, twist.angular.z, simulation_.time())) {
+    ROS_WARN("/cmd_vel is not finite; hovering");
+  }
+}
+
+void SimNode::OnTargetCommand(const geometry_msgs::Twist& twist) {
+  target_commanded_ = true;
+  if (!simulation_.husky().Command(twist.linear.x, twist.angular.z, simulation_.time())) {
+    ROS_WARN("/husky/cmd_vel is not finite; stopping");
+  }
+}
+
+bool SimNode::OnPause(Empty::Request&, Empty::Response&) {
+  paused_ = true;
+  return true;
+}
+
+bool SimNode::OnUnpause(Empty::Request&, Empty::Response&) {
+  if (paused_) RestartTime();
+  paused_ = false;
+  return true;
+}
+
+bool SimNode::OnResetWorld(Empty::Request&, Empty::Response&) {
+  Reset(start_ns_ + simulation_.time_ns());
+  return true;
+}
+
+bool SimNode::OnResetSimulation(Empty::Request&, Empty::Response&) {
+  Reset(0);
+  return true;
+}
+
+void SimNode::Reset(int64_t start_ns) {
+  simulation_.Reset();
+  start_ns_ = start_ns;
+  waiting_ = false;
+  publishers_.PublishClock(Stamp());
+  publishers_.PublishStart(simulation_, Stamp());
+  RestartTime();
+}
+
+bool SimNode::OnStep(tld_follower::Step::Request& request, tld_follower::Step::Response& response) {
+  response.stamp = Stamp();
+  if (!paused_) {
+    response.message = "the simulation is running; call pause_physics first";
+    return true;
+  }
+  const uint64_t last = simulation_.frame() + request.frames;
+  while (ros::ok() && simulation_.frame() < last) {
+    commands_.callAvailable(waiting_ ? kPoll : ros::WallDuration(0));
+    if (!WaitsForCommands()) Advance();
+  }
+  response.success = simulation_.frame() == last;
+  response.stamp = Stamp();
+  return true;
+}
+
+}  // namespace tld_follower::sim
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "gazebo");
+  try {
+    tld_follower::sim::SimNode().Run();
+  } catch (const std::exception& problem) {
+    ROS_FATAL("%s", problem.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <geometry_msgs/Twist.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <std_srvs/Empty.h>
+#include <tld_follower/Step.h>
+
+#include <cstdint>
+#include <string>
+
+#include "sim/parameters_node.h"
+#include "sim/publishers_node.h"
+
+namespace tld_follower::sim {
+
+/// The ROS side of the simulator: one thread that advances it, publishes, and serves callbacks
+/// between frames, while waiting and while paused.
+class SimNode {
+ public:
+  /// Throws std::exception with one readable sentence if the simulation cannot start.
+  SimNode();
+
+  /// Runs until ROS shuts down.
+  void Run();
+
+ private:
+  using Empty = std_srvs::Empty;
+
+  void OnCommand(const geometry_msgs::Twist& twist);
+  void OnTargetCommand(const geometry_msgs::Twist& twist);
+  bool OnPause(Empty::Request&, Empty::Response&);
+  bool OnUnpause(Empty::Request&, Empty::Response&);
+  bool OnResetWorld(Empty::Request&, Empty::Response&);
+  bool OnResetSimulation(Empty::Request&, Empty::Response&);
+  bool OnStep(tld_follower::Step::Request& request, tld_follower::Step::Response& response);
+
+  void Advance();
+  bool WaitsForCommands();
+  double SecondsAhead();
+  void RestartTime();
+  void Reset(int64_t start_ns);
+  ros::Time Stamp() const;
+
+  ros::NodeHandle handle_, private_handle_;
+  // Commands have their own queue, so that the step service can receive them while it runs.
+  ros::CallbackQueue commands_;
+  NodeParameters parameters_;
+  Simulation simulation_;
+  Publishers publishers_;
+  ros::Subscriber command_, target_command_;
+  ros::ServiceServer pause_, unpause_, reset_world_, reset_simulation_, step_;
+
+  bool paused_;
+  int64_t start_ns_ = 0;  // ROS time of the simulation's start.
+  // Lockstep: what has come since the last frame.
+  bool waiting_ = false, commanded_ = false, target_commanded_ = false;
+  ros::WallTime frame_published_;
+  // Realtime: a moment of the simulation and the wall-clock time at which it is due.
+  double anchor_time_ = 0;
+  ros::WallTime anchor_wall_, last_slip_warning_;
+};
+
+}  // namespace tld_follower::sim

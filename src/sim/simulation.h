@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sim/husky.h"
+#include "sim/image_noise.h"
+#include "sim/physics.h"
+#include "sim/renderer.h"
+#include "sim/sensors.h"
+#include "sim/spiri.h"
+#include "sim/world.h"
+
+namespace tld_follower::sim {
+
+/// A place on the ground that replaces the world's [m, rad].
+struct Placement {
+  double x = 0, y = 0, yaw = 0;
+};
+
+struct SimulationConfig {
+  std::string world_file;
+  uint64_t seed = 0;
+  double frame_rate = 30;    ///< Stereo pairs a second of simulated time [Hz].
+  double image_noise = 1.0;  ///< Standard deviation [grey levels].
+  StereoCamera camera;
+  SpiriParameters spiri;
+  SensorParameters sensors;
+  HuskyParameters husky;
+  std::optional<Placement> spiri_place;
+  std::optional<Placement> husky_place;
+};
+
+/// What only a simulator knows. World frame, SI units.
+struct Truth {
+  double distance = 0;      ///< Left camera's centre to the nearest point of the target.
+  double clearance = 0;     ///< Drone's collision shape to the nearest point of anything else.
+  uint32_t collisions = 0;  ///< Contact episodes of the drone since its take-off was complete.
+};
+
+/// What happened at the moment to which the simulation advanced.
+struct Moment {
+  bool tick = false;       ///< 100 Hz: clock, IMU, odometry.
+  bool slow_tick = false;  ///< 50 Hz: joint states and wheel odometry.
+  bool frame = false;      ///< A stereo pair is due.
+};
+
+/// The whole simulation: world, drone, target and cameras. Knows no ROS and no wall clock.
+///
+/// Frame k = 1, 2, ... falls on the physics step nearest to k / frame_rate. The same configuration
+/// and the same commands at the same times give bit-identical states and images, in a fresh object
+/// as after Reset().
+class Simulation {
+ public:
+  /// Throws std::exception with one readable sentence if the configuration cannot be simulated.
+  Simulation(const SimulationConfig& config, const WarningSink& warn);
+  ~Simulation();
+
+  /// Back to the start: rebuilds the world.
+  void Reset();
+
+  /// Steps the physics to the next moment at which something is due.
+  Moment Advance();
+
+  /// Since the start or the last reset.
+  int64_t time_ns() const;
+  double time() const { return double(time_ns()) * 1e-9; }
+  uint64_t frame() const { return frame_; }  ///< Number of the latest frame; 0 before the first.
+
+  /// Draws the stereo pair of this moment; also finds the target's pixels unless `mask` is null.
+  void Render(StereoImages* images, TargetMask* mask);
+  /// Computes the truth of this moment.
+  Truth Measure() const;
+
+  Spiri& spiri();
+  Husky& husky();
+  const Spiri& spiri() const;
+  const Husky& husky() const;
+  const Sensors& sensors() const;
+  /// Reads the range finder [m]; infinity if nothing is in range.
+  double ReadRange();
+  const StereoCamera& camera() const { return config_.camera; }
+  int triangles() const { return renderer_->triangles(); }
+
+ private:
+  struct State;
+
+  btTransform RobotPose(const std::string& name, const std::optional<Placement>& place) const;
+  Scene MakeScene() const;
+  int64_t FrameStep(uint64_t frame) const;
+  void CountContacts();
+
+  const SimulationConfig config_;
+  const Resources resources_;
+  World world_;
+  Robot spiri_robot_, husky_robot_;
+  ImageNoise image_noise_;
+  std::unique_ptr<State> state_;
+  std::unique_ptr<Renderer> renderer_;
+  int64_t step_ = 0;
+  uint64_t frame_ = 0;
+};
+
+}  // namespace tld_follower::sim

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sim/spiri.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace tld_follower::sim {
+namespace {
+
+constexpr double kMaxHeadingError = 0.3;   // Heading and altitude that are held never run away
+constexpr double kMaxAltitudeError = 0.3;  // from the drone by more than this [rad, m].
+constexpr double kStillSpeed = 0.1;        // Slower than this, the place is held [m/s].
+constexpr double kTakenOff = 0.02;  // Take-off ends so near its altitude [m], this slow [m/s].
+
+double Wrap(double angle) { return std::remainder(angle, 2 * M_PI); }
+
+btVector3 ClipHorizontal(const btVector3& v, double limit) {
+  const double norm = std::hypot(v.x(), v.y());
+  const btScalar scale = norm > limit ? btScalar(limit / norm) : btScalar(1);
+  return {v.x() * scale, v.y() * scale, v.z()};
+}
+
+bool IsFinite(const btVector3& v) {
+  return std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z());
+}
+
+// Rotors in the order front left, rear left, rear right, front right; neighbours turn opposite.
+constexpr std::array<double, 4> kAlongX{1, -1, -1, 1};
+constexpr std::array<double, 4> kAlongY{1, 1, -1, -1};
+constexpr std::array<double, 4> kSpin{-1, 1, -1, 1};
+
+}  // namespace
+
+double Heading(const btMatrix3x3& attitude) { return std::atan2(attitude[1][0], attitude[0][0]); }
+
+Spiri::Spiri(const SpiriParameters& parameters, const Robot& robot, const btTransform& pose,
+             Physics* physics)
+    : parameters_(parameters) {
+  std::vector<const RobotLink*> rigid;
+  for (const RobotLink& link : robot.links) rigid.push_back(&link);
+  body_ = physics->AddBody(rigid, pose);
+  mass_ = 1.0 / body_.rigid->getInvMass();
+  inertia_ = body_.rigid->getLocalInertia();
+  gravity_ = body_.rigid->getGravity().length();
+  altitude_ = pose.getOrigin().z();
+  heading_ = Heading(pose.getBasis());
+  hold_ = pose.getOrigin();
+  const double max_thrust =
+      4 * parameters.motor_constant * parameters.max_rotor_speed * parameters.max_rotor_speed;
+  if (!(max_thrust > mass_ * gravity_)) {
+    throw std::runtime_error("spiri's rotors cannot lift it: " + std::to_string(max_thrust) +
+                             " N at full speed, weight " + std::to_string(mass_ * gravity_) + " N");
+  }
+}
+
+bool Spiri::Command(const btVector3& velocity, double yaw_rate, double time) {
+  if (!IsFinite(velocity) || !std::isfinite(yaw_rate)) {
+    command_.reset();
+    return false;
+  }
+  const double max_z = parameters_.max_speed_z;
+  const double max_yaw = parameters_.max_yaw_rate;
+  Setpoint setpoint;
+  setpoint.velocity = ClipHorizontal(velocity, parameters_.max_speed_xy);
+  setpoint.velocity.setZ(btScalar(std::clamp<double>(velocity.z(), -max_z, max_z)));
+  setpoint.yaw_rate = std::clamp(yaw_rate, -max_yaw, max_yaw);
+  setpoint.time = time;
+  command_ = setpoint;
+  return true;
+}
+
+btVector3 Spiri::WantedVelocity(double time) {
+  if (command_ && time - command_->time > parameters_.command_timeout) command_.reset();
+  const btTransform pose = body_.Pose();
+  const btVector3& place = pose.getOrigin();
+  const btVector3 speed = body_.Velocity();
+  const double target = parameters_.take_off_altitude;
+
+  btVector3 wanted(0, 0, 0);
+  if (!flying_) {
+    // The altitude that is held climbs at the take-off speed.
+    altitude_ = std::min(altitude_ + parameters_.take_off_speed * Physics::kStep, target);
+    flying_ = std::abs(place.z() - target) < kTakenOff && std::abs(speed.z()) < kTakenOff;
+  }
+  if (flying_ && command_) {
+    const btMatrix3x3 yaw(btQuaternion(btVector3(0, 0, 1), btScalar(Heading(pose.getBasis()))));
+    wanted = yaw * command_->velocity;
+    altitude_ += command_->velocity.z() * Physics::kStep;
+    heading_ += command_->yaw_rate * Physics::kStep;
+    hold_.reset();
+  } else if (!hold_ && std::hypot(speed.x(), speed.y()) < kStillSpeed) {
+    hold_ = place;
+  }
+  if (hold_) {
+    wanted = btScalar(parameters_.position_p) * (*hold_ - place);
+    wanted.setZ(0);
+    wanted = ClipHorizontal(wanted, parameters_.take_off_speed);
+  }
+  altitude_ =
+      std::clamp<double>(altitude_, place.z() - kMaxAltitudeError, place.z() + kMaxAltitudeError);
+  wanted.setZ(wanted.z() + btScalar(parameters_.position_p * (altitude_ - place.z())));
+  return wanted;
+}
+
+btVector3 Spiri::WantedForce(const btVector3& wanted_velocity) {
+  const btVector3 error = wanted_velocity - body_.Velocity();
+  const btVector3 p(btScalar(parameters_.velocity_xy_p), btScalar(parameters_.velocity_xy_p),
+                    btScalar(parameters_.velocity_z_p));
+  const btVector3 i(btScalar(parameters_.velocity_xy_i), btScalar(parameters_.velocity_xy_i),
+                    btScalar(parameters_.velocity_z_i));
+  const btVector3 acceleration = p * error + integral_;
+  const double lift = std::max(0.3 * gravity_, gravity_ + acceleration.z());
+  const double limit = lift * std::tan(parameters_.max_tilt);
+  const bool saturated = std::hypot(acceleration.x(), acceleration.y()) > limit;
+  // The integrator rests while the tilt is at its limit, or it would wind up.
+  const btScalar dt = btScalar(Physics::kStep);
+  if (!saturated) integral_ += dt * btVector3(i.x() * error.x(), i.y() * error.y(), 0);
+  integral_.setZ(integral_.z() + dt * i.z() * error.z());
+  const btVector3 level = ClipHorizontal(acceleration, limit);
+  return btScalar(mass_) * btVector3(level.x(), level.y(), btScalar(lift));
+}
+
+btVector3 Spiri::WantedTorque(const btVector3& wanted_force, double wanted_yaw_rate) const {
+  const btMatrix3x3& attitude = body_.rigid->getWorldTransform().getBasis();
+  const btVector3 rates = attitude.transpose() * body_.AngularVelocity();
+  // The shortest turn from the rotors' axis to the wanted force, in body axes; it has no z part.
+  const btVector3 wanted_up = attitude.transpose() * wanted_force.normalized();
+  const btVector3 axis = btVector3(0, 0, 1).cross(wanted_up);
+  const double sine = axis.length();
+  const double angle = std::atan2(sine, wanted_up.z());
+  const btVector3 tilt_error = sine > 1e-6 ? axis * btScalar(angle / sine) : axis;
+  const btVector3 acceleration(
+      btScalar(parameters_.attitude_p * tilt_error.x() - parameters_.attitude_d * rates.x()),
+      btScalar(parameters_.attitude_p * tilt_error.y() - parameters_.attitude_d * rates.y()),
+      btScalar(parameters_.yaw_rate_p * (wanted_yaw_rate - rates.z())));
+  return inertia_ * acceleration;
+}
+
+void Spiri::DriveRotors(double thrust, const btVector3& torque) {
+  const double lever = parameters_.arm / std::sqrt(2.0);
+  const double fastest = parameters_.max_rotor_speed;
+  for (size_t r = 0; r < rotor_speeds_.size(); ++r) {
+    const double wanted = thrust / 4 + kAlongY[r] * torque.x() / (4 * lever) -
+                          kAlongX[r] * torque.y() / (4 * lever) +
+                          kSpin[r] * torque.z() / (4 * parameters_.moment_constant);
+    const double speed =
+        std::clamp(std::sqrt(std::max(0.0, wanted) / parameters_.motor_constant), 0.0, fastest);
+    const double lag =
+        speed > rotor_speeds_[r] ? parameters_.time_constant_up : parameters_.time_constant_down;
+    rotor_speeds_[r] += (speed - rotor_speeds_[r]) * (1 - std::exp(-Physics::kStep / lag));
+  }
+}
+
+void Spiri::ApplyForces() {
+  const double lever = parameters_.arm / std::sqrt(2.0);
+  btVector3 force(0, 0, 0), torque(0, 0, 0);
+  for (size_t r = 0; r < rotor_speeds_.size(); ++r) {
+    const double thrust = parameters_.motor_constant * rotor_speeds_[r] * rotor_speeds_[r];
+    force += btVector3(0, 0, btScalar(thrust));
+    torque +=
+        btVector3(btScalar(kAlongY[r] * lever * thrust), btScalar(-kAlongX[r] * lever * thrust),
+                  btScalar(kSpin[r] * parameters_.moment_constant * thrust));
+  }
+  const btMatrix3x3& attitude = body_.rigid->getWorldTransform().getBasis();
+  const btVector3 air = attitude.transpose() * body_.Velocity();
+  const btVector3 rates = attitude.transpose() * body_.AngularVelocity();
+  const btVector3 drag(btScalar(parameters_.drag_xy), btScalar(parameters_.drag_xy),
+                       btScalar(parameters_.drag_z));
+  const btVector3 turn_drag(btScalar(parameters_.drag_roll_pitch),
+                            btScalar(parameters_.drag_roll_pitch), btScalar(parameters_.drag_yaw));
+  force -= air.length() * drag * air;
+  torque -= rates.length() * turn_drag * rates;
+  body_.rigid->applyCentralForce(attitude * force);
+  body_.rigid->applyTorque(attitude * torque);
+}
+
+void Spiri::Actuate(double time) {
+  const btVector3 wanted_velocity = WantedVelocity(time);
+  const double heading = Heading(body_.Pose().getBasis());
+  const double heading_error =
+      std::clamp(Wrap(heading_ - heading), -kMaxHeadingError, kMaxHeadingError);
+  heading_ = heading + heading_error;
+  const double yaw_rate =
+      (flying_ && command_ ? command_->yaw_rate : 0.0) + parameters_.heading_p * heading_error;
+
+  const btVector3 force = WantedForce(wanted_velocity);
+  const btVector3 up = body_.rigid->getWorldTransform().getBasis().getColumn(2);
+  DriveRotors(std::max<double>(0, force.dot(up)), WantedTorque(force, yaw_rate));
+  ApplyForces();
+}
+
+}  // namespace tld_follower::sim

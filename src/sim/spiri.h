@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "sim/physics.h"
+#include "sim/robot.h"
+
+namespace tld_follower::sim {
+
+/// Rotors, drag, gains and limits of the drone; config/spiri.yaml gives each number's source.
+/// Mass and inertia stand in the URDF file.
+struct SpiriParameters {
+  double arm = 0.165;                  ///< Centre to rotor axis; rotors stand in an X [m].
+  double motor_constant = 8.54858e-6;  ///< Thrust per squared rotor speed [N s^2/rad^2].
+  double moment_constant = 0.016;      ///< Reaction torque per thrust [m].
+  double max_rotor_speed = 500;        ///< [rad/s]
+  double time_constant_up = 0.0125;    ///< Rotor speed lag when it rises [s].
+  double time_constant_down = 0.025;   ///< The same when it falls [s].
+  double drag_xy = 0.12;               ///< Force per squared airspeed [N s^2/m^2].
+  double drag_z = 0.1;                 ///< The same along the body's z [N s^2/m^2].
+  double drag_roll_pitch = 0.074;      ///< Torque per squared angular rate [N m s^2/rad^2].
+  double drag_yaw = 0.051;             ///< The same about the body's z [N m s^2/rad^2].
+  double velocity_xy_p = 4.0;          ///< Velocity error to acceleration [1/s].
+  double velocity_xy_i = 0.5;          ///< [1/s^2]
+  double velocity_z_p = 5.0;           ///< [1/s]
+  double velocity_z_i = 1.0;           ///< [1/s^2]
+  double position_p = 1.0;             ///< Hold of place and altitude to velocity [1/s].
+  double attitude_p = 100.0;           ///< Tilt error to angular acceleration [1/s^2].
+  double attitude_d = 20.0;            ///< Body rate to angular acceleration [1/s].
+  double heading_p = 1.0;              ///< Heading hold to yaw rate [1/s].
+  double yaw_rate_p = 5.0;             ///< Yaw rate error to angular acceleration [1/s].
+  double max_tilt = 0.35;              ///< [rad]
+  double max_speed_xy = 4.0;           ///< Commands are clipped to this [m/s].
+  double max_speed_z = 1.0;            ///< [m/s]
+  double max_yaw_rate = 2.0;           ///< [rad/s]
+  double command_timeout = 0.5;        ///< Hover if no command came for so long [s].
+  double take_off_altitude = 0.65;     ///< Of the body's origin above the world's z = 0 [m].
+  double take_off_speed = 0.5;         ///< [m/s]
+};
+
+/// The drone: one rigid body, four rotors with lag, drag, and the controller that turns a velocity
+/// into attitude and thrust.
+///
+/// The cascade has hector_quadrotor's form: velocity PI in the yaw frame -> acceleration -> tilt
+/// (limited) and thrust -> attitude PD -> rotors. It takes off by itself, then obeys commands and
+/// holds its place when there are none. Its own state feeds it, as in the thesis' simulator.
+class Spiri {
+ public:
+  /// `pose` is where the root link starts. Throws std::runtime_error for an unsuitable robot or
+  /// parameters.
+  Spiri(const SpiriParameters& parameters, const Robot& robot, const btTransform& pose,
+        Physics* physics);
+
+  /// A velocity in the drone's yaw frame (x forward, y left, z up) [m/s] and a yaw rate [rad/s],
+  /// given at `time` [s]; obeyed after take-off. A command that is not finite makes the drone hover
+  /// and returns false.
+  bool Command(const btVector3& velocity, double yaw_rate, double time);
+
+  /// Sets the forces for the physics step that starts at `time` [s].
+  void Actuate(double time);
+
+  /// Take-off is complete.
+  bool flying() const { return flying_; }
+  const Body& body() const { return body_; }
+  const std::array<double, 4>& rotor_speeds() const { return rotor_speeds_; }
+
+ private:
+  struct Setpoint {
+    btVector3 velocity{0, 0, 0};
+    double yaw_rate = 0;
+    double time = 0;
+  };
+
+  btVector3 WantedVelocity(double time);
+  btVector3 WantedForce(const btVector3& wanted_velocity);
+  btVector3 WantedTorque(const btVector3& wanted_force, double wanted_yaw_rate) const;
+  void DriveRotors(double thrust, const btVector3& torque);
+  void ApplyForces();
+
+  SpiriParameters parameters_;
+  Body body_;
+  double mass_;
+  btVector3 inertia_;
+  double gravity_;
+  std::optional<Setpoint> command_;
+  bool flying_ = false;
+  std::optional<btVector3> hold_;  // The place that is held while there is no command.
+  double altitude_;                // Altitude that is held, moved by vertical commands.
+  double heading_;                 // The same for yaw.
+  btVector3 integral_{0, 0, 0};    // Acceleration, world axes.
+  std::array<double, 4> rotor_speeds_{};
+};
+
+/// Rotation about z that turns the world's x axis over the body's, i.e. the heading [rad].
+double Heading(const btMatrix3x3& attitude);
+
+}  // namespace tld_follower::sim

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sim/world.h"
+
+#include <filesystem>
+#include <memory>
+#include <sdf/sdf.hh>
+#include <stdexcept>
+
+namespace tld_follower::sim {
+namespace {
+
+btVector3 ToBullet(const ignition::math::Vector3d& v) {
+  return {btScalar(v.X()), btScalar(v.Y()), btScalar(v.Z())};
+}
+
+btTransform ToBullet(const ignition::math::Pose3d& pose) {
+  const auto& q = pose.Rot();
+  return btTransform(
+      btQuaternion(btScalar(q.X()), btScalar(q.Y()), btScalar(q.Z()), btScalar(q.W())),
+      ToBullet(pose.Pos()));
+}
+
+std::array<float, 3> ToRgb(const ignition::math::Color& c) { return {c.R(), c.G(), c.B()}; }
+
+// The place of an SDF object in the world: poses of frames given relative to others are resolved.
+template <typename SdfObject>
+btTransform Resolve(const SdfObject& object, const std::string& what) {
+  ignition::math::Pose3d pose;
+  const sdf::Errors errors = object.SemanticPose().Resolve(pose);
+  if (!errors.empty()) {
+    throw std::runtime_error("the pose of " + what + " is wrong: " + errors.front().Message());
+  }
+  return ToBullet(pose);
+}
+
+Geometry ReadGeometry(const sdf::Geometry& geometry, const std::string& owner) {
+  Geometry result;
+  switch (geometry.Type()) {
+    case sdf::GeometryType::BOX:
+      result.type = Geometry::Type::kBox;
+      result.size = ToBullet(geometry.BoxShape()->Size());
+      break;
+    case sdf::GeometryType::CYLINDER: {
+      const auto* cylinder = geometry.CylinderShape();
+      result.type = Geometry::Type::kCylinder;
+      result.size = {btScalar(cylinder->Radius()), btScalar(cylinder->Radius()),
+                     btScalar(cylinder->Length())};
+      break;
+    }
+    case sdf::GeometryType::SPHERE:
+      result.type = Geometry::Type::kSphere;
+      result.size.setValue(btScalar(geometry.SphereShape()->Radius()),
+                           btScalar(geometry.SphereShape()->Radius()),
+                           btScalar(geometry.SphereShape()->Radius()));
+      break;
+    case sdf::GeometryType::PLANE: {
+      const auto* plane = geometry.PlaneShape();
+      result.type = Geometry::Type::kPlane;
+      result.size = {btScalar(plane->Size().X()), btScalar(plane->Size().Y()), 0};
+      break;
+    }
+    case sdf::GeometryType::MESH:
+      result.type = Geometry::Type::kMesh;
+      result.mesh = geometry.MeshShape()->Uri();
+      result.size = ToBullet(geometry.MeshShape()->Scale());
+      break;
+    default:
+      throw std::runtime_error("'" + owner +
+                               "' has a geometry other than box, cylinder, sphere, plane or mesh");
+  }
+  return result;
+}
+
+Material ReadMaterial(const sdf::Material* material) {
+  Material result;
+  if (material == nullptr) return result;
+  result.colour = ToRgb(material->Diffuse());
+  if (const sdf::Pbr* pbr = material->PbrMaterial()) {
+    if (const sdf::PbrWorkflow* metal = pbr->Workflow(sdf::PbrWorkflowType::METAL)) {
+      result.texture = metal->AlbedoMap();
+      result.light_map = metal->LightMap();
+    }
+  }
+  if (material->Element()->HasElement("tld:texture_size")) {
+    result.texture_size = material->Element()->GetElement("tld:texture_size")->Get<double>();
+    if (!(result.texture_size > 0)) {
+      throw std::runtime_error("<tld:texture_size> must be positive");
+    }
+  }
+  return result;
+}
+
+// libsdformat 12 has no accessor for friction, so its element is looked up.
+double ReadFriction(const sdf::Collision& collision) {
+  sdf::ElementPtr element = collision.Element();
+  for (const char* name : {"surface", "friction", "ode", "mu"}) {
+    if (!element->HasElement(name)) return 1.0;
+    element = element->GetElement(name);
+  }
+  return element->Get<double>();
+}
+
+StaticModel ReadModel(const sdf::Model& model, const WarningSink& warn) {
+  if (!model.Static()) {
+    warn("model '" + model.Name() + "' is not <static>; it is held in place all the same");
+  }
+  StaticModel result;
+  result.name = model.Name();
+  const btTransform model_pose = Resolve(model, model.Name());
+  for (uint64_t l = 0; l < model.LinkCount(); ++l) {
+    const sdf::Link& link = *model.LinkByIndex(l);
+    const btTransform link_pose = model_pose * Resolve(link, model.Name() + "::" + link.Name());
+    for (uint64_t v = 0; v < link.VisualCount(); ++v) {
+      const sdf::Visual& visual = *link.VisualByIndex(v);
+      result.visuals.push_back({link_pose * Resolve(visual, visual.Name()),
+                                ReadGeometry(*visual.Geom(), model.Name()),
+                                ReadMaterial(visual.Material())});
+    }
+    for (uint64_t c = 0; c < link.CollisionCount(); ++c) {
+      const sdf::Collision& collision = *link.CollisionByIndex(c);
+      Geometry geometry = ReadGeometry(*collision.Geom(), model.Name());
+      if (geometry.type == Geometry::Type::kMesh) {
+        throw std::runtime_error("'" + model.Name() +
+                                 "' has a mesh as <collision>; use primitives");
+      }
+      result.collisions.push_back({link_pose * Resolve(collision, collision.Name()),
+                                   std::move(geometry), ReadFriction(collision)});
+    }
+  }
+  return result;
+}
+
+// libsdformat would lump a URDF's fixed links and drop its textures, so robots are read apart:
+// here only their name, file and pose are kept.
+sdf::InterfaceModelPtr KeepUrdfApart(const sdf::NestedInclude& include, sdf::Errors&) {
+  const std::string& file = include.ResolvedFileName();
+  if (std::filesystem::path(file).extension() != ".urdf") return nullptr;
+  const std::string name =
+      include.LocalModelName().value_or(std::filesystem::path(file).stem().string());
+  auto model = std::make_shared<sdf::InterfaceModel>(name, sdf::RepostureFunction(), false, "root",
+                                                     ignition::math::Pose3d::Zero);
+  model->AddLink(sdf::InterfaceLink("root", ignition::math::Pose3d::Zero));
+  return model;
+}
+
+sdf::ParserConfig MakeParser(const Resources& resources) {
+  sdf::ParserConfig parser;
+  parser.SetFindCallback([&resources](const std::string& uri) { return resources.Find(uri); });
+  parser.RegisterCustomModelParser(KeepUrdfApart);
+  parser.SetWarningsPolicy(sdf::EnforcementPolicy::ERR);
+  parser.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::ERR);
+  return parser;
+}
+
+}  // namespace
+
+const RobotPlacement& World::Robot(const std::string& robot) const {
+  for (const RobotPlacement& placement : robots) {
+    if (placement.name == robot) return placement;
+  }
+  throw std::runtime_error("world '" + name + "' does not <include> a robot named '" + robot + "'");
+}
+
+World LoadWorld(const std::string& file, const Resources& resources, const WarningSink& warn) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) {
+    throw std::runtime_error("cannot read the world '" + file + "': no such file");
+  }
+  sdf::Root root;
+  const sdf::Errors errors = root.Load(file, MakeParser(resources));
+  if (!errors.empty()) {
+    throw std::runtime_error("cannot read the world '" + file + "': " + errors.front().Message());
+  }
+  if (root.WorldCount() == 0) {
+    throw std::runtime_error("cannot read the world '" + file + "': it has no <world>");
+  }
+  const sdf::World& source = *root.WorldByIndex(0);
+  try {
+    World world;
+    world.name = source.Name();
+    world.gravity = ToBullet(source.Gravity());
+    if (source.Scene() != nullptr) world.ambient = ToRgb(source.Scene()->Ambient());
+    if (source.Element()->HasElement("tld:sky")) {
+      world.sky_texture = source.Element()->GetElement("tld:sky")->Get<std::string>();
+    }
+    for (uint64_t i = 0; i < source.LightCount(); ++i) {
+      const sdf::Light& light = *source.LightByIndex(i);
+      if (light.Type() != sdf::LightType::DIRECTIONAL) continue;
+      world.sun_direction = ToBullet(light.Direction()).normalized();
+      world.sun_colour = ToRgb(light.Diffuse());
+    }
+    for (uint64_t i = 0; i < source.ModelCount(); ++i) {
+      world.models.push_back(ReadModel(*source.ModelByIndex(i), warn));
+    }
+    for (uint64_t i = 0; i < source.InterfaceModelCount(); ++i) {
+      const sdf::NestedInclude& include = *source.InterfaceModelNestedIncludeByIndex(i);
+      world.robots.push_back(
+          {source.InterfaceModelByIndex(i)->Name(), include.ResolvedFileName(),
+           ToBullet(include.IncludeRawPose().value_or(ignition::math::Pose3d::Zero))});
+    }
+    return world;
+  } catch (const std::runtime_error& problem) {
+    throw std::runtime_error("cannot read the world '" + file + "': " + problem.what());
+  }
+}
+
+}  // namespace tld_follower::sim

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sim/resources.h"
+#include "sim/scene.h"
+
+namespace tld_follower::sim {
+
+/// A fixed model of the world: ground, obstacle, building. Poses are in the world frame.
+struct StaticModel {
+  std::string name;
+  std::vector<Visual> visuals;
+  std::vector<Collision> collisions;
+};
+
+/// A robot that a world places: `<include>` of a URDF file.
+struct RobotPlacement {
+  std::string name;
+  std::string file;  ///< Path of the URDF file.
+  btTransform pose = btTransform::getIdentity();
+};
+
+/// A world as read from an SDF file. World frame: z up.
+struct World {
+  std::string name;
+  btVector3 gravity{0, 0, btScalar(-9.81)};           ///< [m/s^2]
+  btVector3 sun_direction{0, 0, -1};                  ///< Unit vector along the light's rays.
+  std::array<float, 3> sun_colour{0.8f, 0.8f, 0.8f};  ///< Linear, 0..1.
+  std::array<float, 3> ambient{0.4f, 0.4f, 0.4f};     ///< Linear, 0..1.
+  std::string sky_texture;                            ///< Resource URI; empty for a plain sky.
+  std::vector<StaticModel> models;
+  std::vector<RobotPlacement> robots;
+
+  /// The robot called `name`. Throws std::runtime_error if the world does not place it.
+  const RobotPlacement& Robot(const std::string& name) const;
+};
+
+/// Reads an SDF 1.6 world with libsdformat.
+///
+/// Own elements, in a namespace as SDF wants it: `<tld:texture_size>` in a `<material>` is the edge
+/// of one texture repeat [m]; `<tld:sky>` in the `<world>` names the texture of the sky dome.
+/// `<pbr><metal><light_map>` is stretched once over a plane and breaks up the repeats.
+///
+/// Throws std::runtime_error with one readable sentence if the file cannot be read or is no world.
+World LoadWorld(const std::string& file, const Resources& resources, const WarningSink& warn);
+
+}  // namespace tld_follower::sim
