@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Middlebury pairs (aloe 2006, cones 2003) against their true disparity, which is in pixels, 0
+// where it is unknown. They are read from $TLD_FOLLOWER_DATA/stereo.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+#include "stereo/matcher.h"
+
+namespace tld_stereo {
+namespace {
+
+struct Pair {
+  const char *left, *right, *truth;
+  int range;
+  double max_off;      // of the matched pixels, the share off by more than 1 pixel
+  double min_matched;  // of the pixels whose truth is known
+};
+
+void check(const Pair& pair, Algorithm algorithm) {
+  const char* data = std::getenv("TLD_FOLLOWER_DATA");
+  if (!data) GTEST_SKIP() << "TLD_FOLLOWER_DATA is not set: no real pairs to match";
+  const std::string folder = std::string(data) + "/stereo/";
+  const cv::Mat left = cv::imread(folder + pair.left, cv::IMREAD_GRAYSCALE);
+  const cv::Mat right = cv::imread(folder + pair.right, cv::IMREAD_GRAYSCALE);
+  const cv::Mat truth = cv::imread(folder + pair.truth, cv::IMREAD_UNCHANGED);
+  ASSERT_FALSE(left.empty() || right.empty() || truth.empty()) << "missing in " << folder;
+  cv::Mat expected;
+  truth.convertTo(expected, CV_32F);
+
+  MatcherParameters parameters;
+  parameters.algorithm = algorithm;
+  parameters.disparity_range = pair.range;
+  Matcher matcher(parameters);
+  const cv::Mat& disparity = matcher.match(left, right);
+  int known = 0, matched = 0, off = 0;
+  for (int v = 0; v < left.rows; ++v) {
+    for (int u = 0; u < left.cols; ++u) {
+      const float d = expected.at<float>(v, u);
+      if (!(d > 0)) continue;
+      ++known;
+      const int fixed = disparity.at<int16_t>(v, u);
+      if (fixed == matcher.invalid()) continue;
+      ++matched;
+      off += std::abs(static_cast<float>(fixed) / kSteps - d) > 1;
+    }
+  }
+  const double share_off = static_cast<double>(off) / matched;
+  const double share_matched = static_cast<double>(matched) / known;
+  std::printf("%s: matched %.3f, of these off by more than 1 pixel %.4f\n", pair.left,
+              share_matched, share_off);
+  EXPECT_LT(share_off, pair.max_off);
+  EXPECT_GT(share_matched, pair.min_matched);
+}
+
+const Pair kAloe{"aloe/aloeL.jpg", "aloe/aloeR.jpg", "aloe/aloeGT.png", 256, 0, 0};
+const Pair kCones{"cones/left.tif", "cones/right.tif", "cones/left_disp_gt.tif", 64, 0, 0};
+
+Pair bounded(Pair pair, double max_off, double min_matched) {
+  pair.max_off = max_off;
+  pair.min_matched = min_matched;
+  return pair;
+}
+
+TEST(RealPairs, AloeBlockMatching) {
+  check(bounded(kAloe, 0.062, 0.57), Algorithm::kBlockMatching);
+}
+TEST(RealPairs, AloeSemiGlobal) { check(bounded(kAloe, 0.081, 0.66), Algorithm::kSemiGlobal); }
+TEST(RealPairs, ConesBlockMatching) {
+  check(bounded(kCones, 0.056, 0.71), Algorithm::kBlockMatching);
+}
+TEST(RealPairs, ConesSemiGlobal) { check(bounded(kCones, 0.077, 0.79), Algorithm::kSemiGlobal); }
+
+}  // namespace
+}  // namespace tld_stereo
