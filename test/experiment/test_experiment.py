@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import pytest
 
-EXPERIMENT = Path(__file__).parents[2] / "scripts" / "experiment"
+EXPERIMENT = Path(__file__).resolve().parents[2] / "scripts" / "experiment"
 
 
 def run(*arguments):

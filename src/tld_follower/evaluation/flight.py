@@ -151,6 +151,7 @@ class Flight:
             "t": round(t, 6),
             "distance": truth.distance,
             "measured_distance": None if state.distance != state.distance else state.distance,
+            "nearest_obstacle": None if state.nearest_obstacle != state.nearest_obstacle else state.nearest_obstacle,
             "clearance": truth.clearance,
             "collisions": truth.collisions,
             "drone_position": [getattr(truth.drone_pose.position, axis) for axis in "xyz"],

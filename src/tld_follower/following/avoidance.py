@@ -17,22 +17,24 @@ class Avoidance:
     def __init__(self, parameters):
         self._minimum = parameters.minimum_distance
         self._hysteresis = parameters.clearance_hysteresis
-        self._points = max(1, parameters.obstacle_points // _STRIDE**2)
+        self._fraction = parameters.obstacle_fraction
         self._max_speed = parameters.max_speed
         self._active = False
 
     def nearest(self, cloud):
         """Distance in metres of the nearest thing in view; NaN without any depth.
 
-        `cloud` is an ndarray (height, width, 3) in metres, or None. The `obstacle_points` nearest points are
-        passed over, as lone wrong matches of the stereo camera are.
+        `cloud` is an ndarray (height, width, 3) in metres, or None. The nearest points, as many as
+        `obstacle_fraction` of all pixels, are passed over: wrong matches come in small patches.
         """
         if cloud is None:
             return math.nan
-        distances = ranges(cloud[::_STRIDE, ::_STRIDE])
-        if distances.size <= self._points:
+        sample = cloud[::_STRIDE, ::_STRIDE]
+        distances = ranges(sample)
+        passed_over = int(self._fraction * sample.shape[0] * sample.shape[1])
+        if distances.size <= passed_over:
             return math.nan
-        return float(np.partition(distances, self._points)[self._points])
+        return float(np.partition(distances, passed_over)[passed_over])
 
     def retreat(self, nearest):
         """Backward speed in m/s (zero or negative) that clears the minimum distance.

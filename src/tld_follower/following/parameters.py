@@ -22,10 +22,10 @@ class Parameters:
     max_speed: float = 1.0
     max_climb_rate: float = 0.5
     max_yaw_rate: float = 1.0
-    distance_range: float = 0.3
+    distance_range: float = 0.6
     near_percentile: float = 10.0
     min_points: int = 50
-    obstacle_points: int = 60
+    obstacle_fraction: float = 0.005
     max_age: float = 0.3
 
     def __post_init__(self):

@@ -174,7 +174,7 @@ def test_wrong_parameters_are_refused(values):
 
 
 def test_the_config_file_gives_the_defaults():
-    config = Path(__file__).parents[3] / "config" / "follower.yaml"
+    config = Path(__file__).resolve().parents[3] / "config" / "follower.yaml"
     values = yaml.safe_load(config.read_text())
     values.pop("cloud_wait")  # the node's
     assert Parameters.from_dict(values) == Parameters()
