@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The Husky: textures and meshes. Frames and sizes as in husky.urdf, metres."""
 
+import itertools
+
 import cv2
 import numpy as np
 import paint
@@ -17,7 +19,7 @@ WHEEL_RADIUS, WHEEL_WIDTH, CORE_RADIUS = 0.1651, 0.1143, 0.146
 
 
 def _weather(rng, image, mud, fine=1.0):
-    """What use does to paint: stains of every size, stone chips, scratches, mud from below."""
+    """Wear the paint: stains of every size, stone chips, scratches, mud from below."""
     height, width = image.shape[:2]
     paint.tint(
         image,
@@ -45,7 +47,7 @@ def shell():
             paint.bolt(strip, x, 234, 7)
     for x in (250, 760):
         side[:, x : x + 4] *= 0.25
-    paint.label(side, "HUSKY", 318, 175, 92, (24, 24, 24), 16)
+    paint.label(side, "HUSKY", 398, 165, 58, (24, 24, 24), 10)
     paint.label(side, "A200", 800, 150, 48, (24, 24, 24), 7)
     paint.stripes(side, 24, 66, 200, 90, 30, ((24, 24, 24), YELLOW))
 
@@ -79,7 +81,7 @@ def black():
 
 
 def bumper():
-    """The wrap of a bumper, 1024x256."""
+    """Draw the wrap of a bumper, 1024x256."""
     rng = np.random.default_rng(33)
     image = paint.flat(256, 1024, (46, 44, 43))
     image[116:124] *= 0.3
@@ -97,7 +99,7 @@ def bumper():
 
 
 def deck():
-    """Top: yellow rim, dark plate with its grid of holes, labels. 1024 px are the deck's length."""
+    """Top: yellow rim, dark plate with its grid of holes, labels. Up is forward."""
     rng = np.random.default_rng(34)
     image = paint.flat(1024, 1024, YELLOW)
     cv2.rectangle(image, (70, 120), (954, 904), (0.17, 0.17, 0.18), -1)
@@ -199,11 +201,11 @@ def shell_mesh():
 
 
 def deck_mesh():
-    """The top."""
+    """Build the top."""
     mesh = Obj()
     x, y = 0.395, HALF_WIDTH
-    # The image's top is the left side, its right end the front.
-    mesh.quad((-x, -y, DECK), (x, -y, DECK), (x, y, DECK), (-x, y, DECK), (0, 0, 1, 1))
+    # The image's top is the front, so that letters read from behind.
+    mesh.quad((-x, y, DECK), (-x, -y, DECK), (x, -y, DECK), (x, y, DECK), (0, 0, 1, 1))
     return mesh
 
 
@@ -218,14 +220,14 @@ def bumper_mesh():
         (0.452, -HALF_WIDTH),
         (0.405, -HALF_WIDTH),
     ]
-    length = np.cumsum([0.0] + [np.hypot(b[0] - a[0], b[1] - a[1]) for a, b in zip(outline, outline[1:])])
+    length = np.cumsum([0.0] + [np.hypot(b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(outline)])
     for end in (1, -1):
         points = [(end * x, end * y) for x, y in outline]
-        for i, (a, b) in enumerate(zip(points, points[1:])):
+        for i, (a, b) in enumerate(itertools.pairwise(points)):
             u0, u1 = 1 - length[i] / length[-1], 1 - length[i + 1] / length[-1]
             mesh.quad((*b, 0.0), (*a, 0.0), (*a, BUMPER_TOP), (*b, BUMPER_TOP), (u1, 0, u0, 1))
         centre = (end * 0.43, 0.0)
-        for a, b in zip(points, points[1:] + points[:1]):
+        for a, b in itertools.pairwise([*points, points[0]]):
             for z, up in ((BUMPER_TOP, 1), (0.0, -1)):
                 mesh.triangle((*centre, z), (*a, z), (*b, z), (0.02, 0.62, 0.5, 0.98), outward=(0, 0, up))
     return mesh
@@ -252,7 +254,7 @@ def rail_mesh():
 
 
 def wheel_mesh(lugs=16):
-    """A chunky tyre about the y axis: core, lugs in two staggered rows, dished faces."""
+    """Build a chunky tyre about the y axis: core, lugs in two staggered rows, dished faces."""
     mesh = Obj()
     half = WHEEL_WIDTH / 2
 

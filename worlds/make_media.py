@@ -5,8 +5,8 @@
 import sys
 from pathlib import Path
 
-import husky_media
 import ground_media
+import husky_media
 import obstacle_media
 
 

@@ -7,7 +7,7 @@ import paint
 
 
 def brick(size=512):
-    """Running bond, 8 courses of 4 bricks; one repeat is 1 m."""
+    """Draw running bond, 8 courses of 4 bricks; one repeat is 1 m."""
     rng = np.random.default_rng(21)
     image = paint.flat(size, size, (140, 146, 150))
     tall, wide = size // 8, size // 4

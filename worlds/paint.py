@@ -9,7 +9,7 @@ import numpy as np
 
 
 def flat(height, width, bgr):
-    """A plane colour; `bgr` is three numbers 0..255."""
+    """Return a plane colour; `bgr` is three numbers 0..255."""
     return np.full((height, width, 3), np.array(bgr, np.float32) / 255, np.float32)
 
 
@@ -40,7 +40,7 @@ def blend(image, bgr, alpha):
 
 
 def _wrapped(points, radius, height, width):
-    """The copies of a mark that show at the edges of a seamless image."""
+    """Yield the copies of a mark that show at the edges of a seamless image."""
     for x, y in points:
         for dx in (-width, 0, width):
             for dy in (-height, 0, height):
@@ -121,7 +121,7 @@ def grime(rng, image, bgr, strength, coarse=60):
 
 
 def bolt(image, x, y, radius):
-    """A bolt head with a lit rim."""
+    """Draw a bolt head with a lit rim."""
     cv2.circle(image, (x, y), radius + 2, (0.05, 0.05, 0.05), -1, cv2.LINE_AA)
     cv2.circle(image, (x, y), radius, (0.55, 0.56, 0.58), -1, cv2.LINE_AA)
     cv2.circle(image, (x - 1, y - 1), max(1, radius // 2), (0.85, 0.86, 0.88), -1, cv2.LINE_AA)

@@ -5,6 +5,7 @@
 #include <EGL/eglext.h>
 
 #include <cstddef>
+#include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
@@ -28,6 +29,9 @@ GLuint Compile(GLenum kind, const char* source) {
 }  // namespace
 
 GlContext::GlContext() {
+  // Mesa's software renderer takes as much CPU time with one thread as with many, and the other
+  // cores have a tracker to run. Pixels do not depend on it.
+  setenv("LP_NUM_THREADS", "0", /*overwrite=*/0);
   const auto get_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
       eglGetProcAddress("eglGetPlatformDisplayEXT"));
   EGLDisplay display =

@@ -109,7 +109,12 @@ btVector3 Spiri::WantedForce(const btVector3& wanted_velocity) {
                     btScalar(parameters_.velocity_z_p));
   const btVector3 i(btScalar(parameters_.velocity_xy_i), btScalar(parameters_.velocity_xy_i),
                     btScalar(parameters_.velocity_z_i));
-  const btVector3 acceleration = p * error + integral_;
+  // The drag at the wanted speed is known, so the integrator need not find it while the error is
+  // still large: that would overshoot.
+  const double speed = std::hypot(wanted_velocity.x(), wanted_velocity.y());
+  const btScalar against_drag = btScalar(parameters_.drag_xy * speed / mass_);
+  const btVector3 acceleration =
+      p * error + integral_ + against_drag * btVector3(wanted_velocity.x(), wanted_velocity.y(), 0);
   const double lift = std::max(0.3 * gravity_, gravity_ + acceleration.z());
   const double limit = lift * std::tan(parameters_.max_tilt);
   const bool saturated = std::hypot(acceleration.x(), acceleration.y()) > limit;

@@ -19,6 +19,11 @@ bool isCalibrated(const Calibration& camera) {
          camera.p(1, 1) > 0;
 }
 
+bool isFinite(const Calibration& camera) {
+  return cv::checkRange(camera.k) && cv::checkRange(camera.r) && cv::checkRange(camera.p) &&
+         cv::checkRange(camera.d);
+}
+
 void makeMaps(const Calibration& camera, cv::Mat& map_xy, cv::Mat& map_fraction) {
   const cv::Matx33d p = camera.p.get_minor<3, 3>(0, 0);
   const size_t n = camera.d.size();
@@ -90,6 +95,7 @@ cv::Mat Rectifier::rectify(const cv::Mat& raw, const Calibration& calibration) {
          << raw.size();
     throw std::invalid_argument(text.str());
   }
+  if (!isFinite(calibration)) throw std::invalid_argument("camera_info holds NaN or infinity");
   if (calibration != calibration_) {
     calibration_ = {};  // stays unset should the maps fail
     map_xy_.release();

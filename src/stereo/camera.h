@@ -46,7 +46,7 @@ class Rectifier {
  public:
   /// Returns the rectified image (8 bit, any channels): `raw` itself where nothing has to be done,
   /// else a buffer that stays valid until the next call.
-  /// @throws std::invalid_argument for an image that differs in size from the calibration, an
+  /// @throws std::invalid_argument for an image that differs in size from the calibration, NaN, an
   ///   unknown distortion model or a number of coefficients which that model does not have.
   cv::Mat rectify(const cv::Mat& raw, const Calibration& calibration);
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stereo/stereo_node.h"
 
-#include <message_filters/sync_policies/approximate_time.h>
-#include <message_filters/sync_policies/exact_time.h>
-#include <message_filters/synchronizer.h>
 #include <pcl_conversions/pcl_conversions.h>
 #include <ros/master.h>
 #include <sensor_msgs/image_encodings.h>
@@ -18,10 +15,6 @@ namespace {
 
 using sensor_msgs::CameraInfo;
 using sensor_msgs::Image;
-using ExactTime = message_filters::sync_policies::ExactTime<Image, CameraInfo, Image, CameraInfo>;
-using ApproximateTime =
-    message_filters::sync_policies::ApproximateTime<Image, CameraInfo, Image, CameraInfo>;
-
 constexpr double kCheckPeriod = 5;  // s, wall time
 constexpr std::chrono::seconds kSameWarningPeriod{10};
 constexpr uint32_t kNewestOnly = 1;  // a queue of more would only make pairs older under load
@@ -50,7 +43,9 @@ Calibration toCalibration(const CameraInfo& info) {
   calibration.distortion_model = info.distortion_model;
   calibration.d = info.D;
   calibration.k = window * cv::Matx33d(info.K.data());
-  calibration.r = cv::Matx33d(info.R.data());
+  // Drivers of rectified cameras often leave R empty.
+  const bool has_r = std::any_of(info.R.begin(), info.R.end(), [](double r) { return r != 0; });
+  calibration.r = has_r ? cv::Matx33d(info.R.data()) : cv::Matx33d::eye();
   calibration.p = window * cv::Matx34d(info.P.data());
   return calibration;
 }
@@ -86,13 +81,13 @@ StereoNode::StereoNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       transport_(nh),
       hints_("raw", ros::TransportHints().tcpNoDelay(), private_nh),
       queue_size_(std::max(1, private_nh.param("queue_size", 5))),
-      approximate_(private_nh.param("approximate_sync", false)),
+      approximate_sync_(private_nh.param("approximate_sync", false)),
       reconfigure_server_(private_nh) {
-  approximate_ ? synchronise<ApproximateTime>() : synchronise<ExactTime>();
-  images_[0].registerCallback([this](const ImagePtr&) { ++received_[0]; });
-  infos_[0].registerCallback([this](const InfoPtr&) { ++received_[1]; });
-  images_[1].registerCallback([this](const ImagePtr&) { ++received_[2]; });
-  infos_[1].registerCallback([this](const InfoPtr&) { ++received_[3]; });
+  makeSynchroniser();
+  images_[0].registerCallback([this](const ros::MessageEvent<const Image>& m) { add<0>(m); });
+  infos_[0].registerCallback([this](const ros::MessageEvent<const CameraInfo>& m) { add<1>(m); });
+  images_[1].registerCallback([this](const ros::MessageEvent<const Image>& m) { add<2>(m); });
+  infos_[1].registerCallback([this](const ros::MessageEvent<const CameraInfo>& m) { add<3>(m); });
 
   reconfigure_server_.setCallback(
       [this](tld_follower::StereoConfig& config, uint32_t) { reconfigure(config); });
@@ -105,13 +100,33 @@ StereoNode::StereoNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                                      [this](const ros::WallTimerEvent&) { checkInputs(); });
 }
 
-template <typename Policy>
-void StereoNode::synchronise() {
+void StereoNode::makeSynchroniser() {
   using namespace boost::placeholders;
-  auto synchroniser = std::make_shared<message_filters::Synchronizer<Policy>>(
-      Policy(queue_size_), images_[0], infos_[0], images_[1], infos_[1]);
-  synchroniser->registerCallback(boost::bind(&StereoNode::receive, this, _1, _2, _3, _4));
-  synchroniser_ = synchroniser;
+  if (approximate_sync_) {
+    synchroniser_ = std::make_unique<Approximate>(static_cast<uint32_t>(queue_size_));
+  } else {
+    synchroniser_ = std::make_unique<Exact>(static_cast<uint32_t>(queue_size_));
+  }
+  std::visit(
+      [this](auto& synchroniser) {
+        synchroniser->registerCallback(boost::bind(&StereoNode::receive, this, _1, _2, _3, _4));
+      },
+      synchroniser_);
+}
+
+template <int kInput, typename Message>
+void StereoNode::add(const ros::MessageEvent<const Message>& event) {
+  const ros::Time stamp = event.getConstMessage()->header.stamp;
+  // After a jump back in time (a bag that starts over, a reset simulation) messages that wait for
+  // their partners would crowd out all new ones.
+  if (stamp < newest_[kInput]) {
+    makeSynchroniser();
+    newest_ = {};
+  }
+  newest_[kInput] = stamp;
+  ++received_[kInput];
+  std::visit([&event](auto& synchroniser) { synchroniser->template add<kInput>(event); },
+             synchroniser_);
 }
 
 void StereoNode::subscribeWhileNeeded() {
@@ -122,6 +137,7 @@ void StereoNode::subscribeWhileNeeded() {
   received_ = {};
   pairs_ = 0;
   if (!needed) {
+    makeSynchroniser();  // forgets what waits for a partner
     for (auto& image : images_) image.unsubscribe();
     for (auto& info : infos_) info.unsubscribe();
     return;
@@ -142,43 +158,38 @@ void StereoNode::reconfigure(tld_follower::StereoConfig& config) {
   config.disparity_range = matcher_.parameters().disparity_range;
 }
 
-void StereoNode::receive(const ImagePtr& left, const InfoPtr& left_info, const ImagePtr& right,
-                         const InfoPtr& right_info) {
-  ++pairs_;
-  try {
-    process(*left, *left_info, *right, *right_info);
-  } catch (const std::exception& error) {
-    warn(std::string("no disparity for this pair: ") + error.what());
-  }
+void StereoNode::Eye::read(const Image& image, const CameraInfo& info) try {
+  calibration = toCalibration(info);
+  encoding = parseEncoding(image.encoding);
+  raw = toMat(image, encoding);
+  rectified_grey = grey_rectifier_.rectify(toGrey(raw, encoding, grey_), calibration);
+} catch (const std::invalid_argument& error) {
+  throw std::invalid_argument(name + " camera: " + error.what());
 }
 
-void StereoNode::process(const Image& left, const CameraInfo& left_info, const Image& right,
-                         const CameraInfo& right_info) {
-  const Calibration left_calibration = toCalibration(left_info);
-  const Calibration right_calibration = toCalibration(right_info);
-  const auto geometry = StereoGeometry::from(left_calibration, right_calibration);
+Texture StereoNode::Eye::texture() {
+  if (encoding == Encoding::kMono) return {rectified_grey};
+  Texture texture = toTexture(raw, encoding, texture_);
+  texture.pixels = texture_rectifier_.rectify(texture.pixels, calibration);
+  return texture;
+}
 
-  const Encoding left_encoding = parseEncoding(left.encoding);
-  const Encoding right_encoding = parseEncoding(right.encoding);
-  const cv::Mat left_raw = toMat(left, left_encoding);
-  const cv::Mat right_raw = toMat(right, right_encoding);
-
-  const cv::Mat left_grey =
-      left_.grey_rectifier.rectify(toGrey(left_raw, left_encoding, left_.grey), left_calibration);
-  const cv::Mat right_grey = right_.grey_rectifier.rectify(
-      toGrey(right_raw, right_encoding, right_.grey), right_calibration);
-  const cv::Mat& disparity = matcher_.match(left_grey, right_grey);
-
-  if (cloud_publisher_.getNumSubscribers() > 0) {
-    Texture texture{left_grey};
-    if (left_encoding != Encoding::kMono) {
-      texture = toTexture(left_raw, left_encoding, left_.texture);
-      texture.pixels = left_.texture_rectifier.rectify(texture.pixels, left_calibration);
+void StereoNode::receive(const ImagePtr& left_image, const InfoPtr& left_info,
+                         const ImagePtr& right_image, const InfoPtr& right_info) {
+  ++pairs_;
+  try {
+    left_.read(*left_image, *left_info);
+    right_.read(*right_image, *right_info);
+    const auto geometry = StereoGeometry::from(left_.calibration, right_.calibration);
+    const cv::Mat& disparity = matcher_.match(left_.rectified_grey, right_.rectified_grey);
+    if (cloud_publisher_.getNumSubscribers() > 0) {
+      publishCloud(disparity, geometry, left_image->header);
     }
-    publishCloud(disparity, texture, geometry, left.header);
-  }
-  if (disparity_publisher_.getNumSubscribers() > 0) {
-    publishDisparity(disparity, geometry, left.header);
+    if (disparity_publisher_.getNumSubscribers() > 0) {
+      publishDisparity(disparity, geometry, left_image->header);
+    }
+  } catch (const std::exception& error) {
+    warn(std::string("no disparity for this pair: ") + error.what());
   }
 }
 
@@ -208,12 +219,13 @@ void StereoNode::publishDisparity(const cv::Mat& disparity, const StereoGeometry
   disparity_publisher_.publish(message);
 }
 
-void StereoNode::publishCloud(const cv::Mat& disparity, const Texture& texture,
-                              const StereoGeometry& geometry, const std_msgs::Header& header) {
+void StereoNode::publishCloud(const cv::Mat& disparity, const StereoGeometry& geometry,
+                              const std_msgs::Header& header) {
   // The bytes move from the last message to PCL and back: no copy, no new memory.
   pcl::PCLPointCloud2 cloud;
   pcl_conversions::moveToPCL(cloud_message_, cloud);
-  cloud_maker_.make(disparity, matcher_.parameters().min_disparity, texture, geometry, cloud);
+  cloud_maker_.make(disparity, matcher_.parameters().min_disparity, left_.texture(), geometry,
+                    cloud);
   pcl_conversions::moveFromPCL(cloud, cloud_message_);
   cloud_message_.header = header;  // PCL's own stamp has microseconds only
   cloud_publisher_.publish(cloud_message_);
@@ -246,8 +258,9 @@ void StereoNode::checkInputs() {
     warn("no disparity: nothing arrives on " + joined(silent) + " (check with: rostopic hz)");
   } else {
     warn("no disparity: images and camera_info arrive, but none of them pair up; " +
-         std::string(approximate_ ? "their stamps are too far apart for queue_size"
-                                  : "their stamps must be identical, else set approximate_sync"));
+         std::string(approximate_sync_
+                         ? "their stamps are too far apart for queue_size"
+                         : "their stamps must be identical, else set approximate_sync"));
   }
 }
 

@@ -5,6 +5,9 @@
 #include <image_transport/image_transport.h>
 #include <image_transport/subscriber_filter.h>
 #include <message_filters/subscriber.h>
+#include <message_filters/sync_policies/approximate_time.h>
+#include <message_filters/sync_policies/exact_time.h>
+#include <message_filters/synchronizer.h>
 #include <ros/ros.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
@@ -16,9 +19,11 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <variant>
 
 #include "stereo/camera.h"
 #include "stereo/cloud.h"
+#include "stereo/image.h"
 #include "stereo/matcher.h"
 
 namespace tld_stereo {
@@ -35,24 +40,40 @@ class StereoNode {
   using ImagePtr = sensor_msgs::ImageConstPtr;
   using InfoPtr = sensor_msgs::CameraInfoConstPtr;
 
-  /// One camera's side of the work: its rectification and the buffers that outlive a frame.
+  using Exact = message_filters::Synchronizer<message_filters::sync_policies::ExactTime<
+      sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::Image, sensor_msgs::CameraInfo>>;
+  using Approximate = message_filters::Synchronizer<message_filters::sync_policies::ApproximateTime<
+      sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::Image, sensor_msgs::CameraInfo>>;
+
+  /// One camera: what it sent last, and the buffers that outlive a frame.
   struct Eye {
-    Rectifier grey_rectifier, texture_rectifier;
-    cv::Mat grey, texture;
+    std::string name;
+    Calibration calibration;
+    Encoding encoding = Encoding::kMono;
+    cv::Mat raw;             // shares the message's bytes
+    cv::Mat rectified_grey;  // shares them too where nothing had to be done
+
+    /// @throws std::invalid_argument, with the camera's name, for messages that make no picture.
+    void read(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info);
+    /// Colours of the rectified image that was read last.
+    Texture texture();
+
+   private:
+    Rectifier grey_rectifier_, texture_rectifier_;
+    cv::Mat grey_, texture_;
   };
 
-  template <typename Policy>
-  void synchronise();
+  void makeSynchroniser();
+  template <int kInput, typename Message>
+  void add(const ros::MessageEvent<const Message>& event);
   void subscribeWhileNeeded();
   void reconfigure(tld_follower::StereoConfig& config);
-  void receive(const ImagePtr& left, const InfoPtr& left_info, const ImagePtr& right,
+  void receive(const ImagePtr& left_image, const InfoPtr& left_info, const ImagePtr& right_image,
                const InfoPtr& right_info);
-  void process(const sensor_msgs::Image& left, const sensor_msgs::CameraInfo& left_info,
-               const sensor_msgs::Image& right, const sensor_msgs::CameraInfo& right_info);
   void publishDisparity(const cv::Mat& disparity, const StereoGeometry& geometry,
                         const std_msgs::Header& header);
-  void publishCloud(const cv::Mat& disparity, const Texture& texture,
-                    const StereoGeometry& geometry, const std_msgs::Header& header);
+  void publishCloud(const cv::Mat& disparity, const StereoGeometry& geometry,
+                    const std_msgs::Header& header);
   void checkInputs();
   void warn(const std::string& text);
 
@@ -60,20 +81,22 @@ class StereoNode {
   image_transport::ImageTransport transport_;
   image_transport::TransportHints hints_;
   int queue_size_;
-  bool approximate_;
+  bool approximate_sync_;
 
   std::array<image_transport::SubscriberFilter, 2> images_;
   std::array<message_filters::Subscriber<sensor_msgs::CameraInfo>, 2> infos_;
-  std::shared_ptr<void> synchroniser_;  // of one of two policies; dies before what feeds it
+  std::variant<std::unique_ptr<Exact>, std::unique_ptr<Approximate>> synchroniser_;
   bool subscribed_ = false;
 
   Matcher matcher_;
   CloudMaker cloud_maker_;
-  Eye left_, right_;
+  Eye left_{"left"}, right_{"right"};
   stereo_msgs::DisparityImage disparity_message_;
   sensor_msgs::PointCloud2 cloud_message_;
 
-  // What came in since checkInputs() looked: left image, left info, right image, right info; pairs.
+  // Of left image, left info, right image, right info: the newest stamp, and how many came in since
+  // checkInputs() looked; pairs_: how many pairs they made.
+  std::array<ros::Time, 4> newest_;
   std::array<int, 4> received_{};
   int pairs_ = 0;
   ros::Time last_check_;

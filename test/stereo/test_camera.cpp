@@ -120,6 +120,9 @@ TEST(Camera, RefusesAnotherSizeOrModelAndRecovers) {
   odd.d = {0.1, 0, 0, 0, 0};
   odd.distortion_model = "kaleidoscope";
   EXPECT_THROW(rectifier.rectify(raw, odd), std::invalid_argument);
+  odd = makeLeft();
+  odd.d[1] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(rectifier.rectify(raw, odd), std::invalid_argument);
   EXPECT_EQ(rectifier.rectify(raw, makeLeft()).data, raw.data);
 }
 

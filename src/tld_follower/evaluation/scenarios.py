@@ -35,7 +35,7 @@ class Scenario:
 
 
 # 1 m from the left camera to Husky's rear at hover height, with Husky at the origin facing +x.
-SPIRI_START = (-1.57, 0.0, 0.0)
+SPIRI_START = (-1.5, 0.0, 0.0)
 
 # Thesis sections 4.2 and 4.3: rest, 12 s straight at 1 m/s, halt.
 STRAIGHT = Scenario("straight", box_at=4.0, start=6.0, halt=18.0, end=24.0, speed=1.0)

@@ -48,6 +48,7 @@ class Cluster:
 
     box: Box
     confidence: float
+    conservative: float
 
 
 class Detector:
@@ -141,7 +142,8 @@ class Detector:
         for label in range(labels.max() + 1):
             members = labels == label
             mean = np.average(boxes[members], axis=0, weights=weights[members])
-            clusters.append(Cluster(Box(*map(float, mean)), float(weights[members].max())))
+            conservative = detections.similarity.conservative[accepted][members].max()
+            clusters.append(Cluster(Box(*map(float, mean)), float(weights[members].max()), float(conservative)))
         return sorted(clusters, key=lambda c: -c.confidence)
 
 

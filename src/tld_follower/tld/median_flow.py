@@ -26,11 +26,13 @@ class Flow:
     ----------
     box : the moved and scaled box [pixel].
     error : median forward-backward error over the side of the box (sqrt of its area).
+    residual : median distance of the points from the motion found, over the same side; large at occlusion.
     points : (N, 2) float32, the reliable points in the new image [pixel].
     """
 
     box: Box
     error: float
+    residual: float
     points: np.ndarray
 
 
@@ -75,6 +77,7 @@ def track(previous: Frame, current: Frame, box: Box, points: np.ndarray, paramet
     if error > parameters.max_fb_error:
         return None
     similarity = patch_ncc(before, after, start, end, parameters.flow_patch)
+    every_start, every_end = start, end
     kept = (distance <= np.median(distance)) & (similarity >= np.median(similarity))
     if np.count_nonzero(kept) < 4:
         kept = distance <= np.median(distance)
@@ -85,7 +88,10 @@ def track(previous: Frame, current: Frame, box: Box, points: np.ndarray, paramet
     moved = Box.from_center(
         center_x + float(shift[0]), center_y + float(shift[1]), box.width * scale, box.height * scale
     )
-    return Flow(moved, error, (end + origin + 0.5) * factor)
+    middle = np.median(start, axis=0)
+    expected = every_start + (scale - 1.0) * (every_start - middle) + shift / factor
+    residual = float(np.median(np.hypot(*(every_end - expected).T))) * factor / side
+    return Flow(moved, error, residual, (end + origin + 0.5) * factor)
 
 
 def _crops(previous: Frame, current: Frame, box: Box, octave: int, parameters: Parameters):

@@ -23,7 +23,7 @@ class Parameters:
     lk_levels: int = 3
     flow_side: float = 96.0
     flow_patch: int = 10
-    max_fb_error: float = 0.15
+    max_fb_error: float = 0.25
 
     scale_step: float = 1.2
     shift: float = 0.1

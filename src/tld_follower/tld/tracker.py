@@ -14,6 +14,7 @@ from tld_follower.tld.detector import Cluster, Detections, Detector, overlaps
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.learning import Learner
 from tld_follower.tld.parameters import Parameters
+from tld_follower.tld.object_model import best_products as _bp
 from tld_follower.tld.redetection import SiftMemory
 
 
@@ -98,7 +99,10 @@ class Tracker:
             self._memory = SiftMemory(self._sift, parameters.sift_views)
             self._memory.learn(frame, inside)
         self._frame = frame
-        self._last_box = inside
+        self._last_box = self._box = inside
+        self._coherent = 9
+        self._doubt = False
+        self._missed = 0
         self._result = Result(inside, 1.0, True, True, "tracker")
 
     def update(self, image: np.ndarray) -> Result:
@@ -120,16 +124,25 @@ class Tracker:
                 f"{self._frame.width}x{self._frame.height}"
             )
         tracked = self._track(frame)
-        lost = self._result.box is None
-        scales = self._parameters.scales if lost else self._parameters.tracking_scales
-        detections = self._detector.detect(frame, self._last_box, scales)
+        detections = self._detector.detect(frame, self._last_box, self._reach())
         self._result = self._fuse(frame, tracked, detections)
-        if self._result.box is not None:
-            self._last_box = self._result.box
+        box = self._result.box
+        if box is None:
+            self._missed += 1
+        else:
+            self._missed = 0
+            self._last_box = self._box = box
             if self._result.valid and self.learning:
-                self._learn(frame, self._result.box, detections)
+                self._learn(frame, self._result, detections)
         self._frame = frame
         return self._result
+
+    def _reach(self) -> int:
+        """Size steps about the last box to search: few while it is tracked, more the longer it is lost."""
+        import os
+        parameters = self._parameters
+        wider = self._missed // int(os.environ.get("WIDEN", 8))
+        return min(parameters.tracking_scales + wider, parameters.scales)
 
     def _similarity(self, frame: Frame, box: Box) -> tuple[float, float]:
         """Relative and conservative similarity of a box."""
@@ -137,7 +150,8 @@ class Tracker:
         return float(similarity.relative[0]), float(similarity.conservative[0])
 
     def _track(self, frame: Frame) -> Box | None:
-        box = self._result.box
+        box = self._box
+        self._residual = 9.0
         if box is None:
             return None
         side = self._parameters.grid_points
@@ -148,24 +162,39 @@ class Tracker:
         flow = median_flow.track(self._frame, frame, box, points, self._parameters)
         if flow is None or flow.box.inside_fraction(frame.width, frame.height) <= 0.0:
             return None
+        self._residual = flow.residual
         return flow.box
 
     def _fuse(self, frame: Frame, tracked: Box | None, detections: Detections) -> Result:
         """Decide on the state of the object (thesis section 3.1.4; Kalal 2012)."""
+        import os
+        CON = float(os.environ.get("CON", 0.45)); GRACE = int(os.environ.get("GRACE", 10)); LOSTT = float(os.environ.get("LOSTT", 0.5))
+        LOSTC = float(os.environ.get("LOSTC", 0.0))
         parameters = self._parameters
-        clusters = self._detector.clusters(detections)
+        clusters = [c for c in self._detector.clusters(detections) if c.conservative > CON]
         if tracked is None:
+            self._box = None
             return self._redetect(frame, clusters)
-        relative, conservative = self._similarity(frame, tracked)
+        box = self._refine(tracked, detections)
+        box = self._align(frame, box, detections)
+        relative, conservative = self._similarity(frame, box)
         rivals = [
             c
             for c in clusters
             if c.box.overlap(tracked) < parameters.takeover_overlap and c.confidence > relative
         ]
         if len(rivals) == 1:
+            self._doubt=True; self._coherent=0
             return Result(rivals[0].box, rivals[0].confidence, True, False, "detector")
+        MCONF = int(os.environ.get("MCONF", 3)); LOSTU=float(os.environ.get("LOSTU", 0.4))
+        if self._residual > float(os.environ.get("RESID", 0.05)): self._doubt = True
+        if relative < (LOSTT if self._doubt else LOSTU) or conservative < LOSTC:
+            self._box = box if self._missed < GRACE else None
+            return Result(None, 0.0, False, self._result.valid and self._missed < GRACE, "none")
+        if self._residual < float(os.environ.get("RESID", 0.05)) and relative >= LOSTT: self._coherent += 1
+        else: self._coherent = 0
+        if self._coherent > MCONF and relative >= 0.5: self._doubt = False
         valid = self._result.valid or conservative > parameters.valid_threshold
-        box = self._refine(tracked, detections)
         return Result(box, relative, True, valid, "tracker")
 
     def _redetect(self, frame: Frame, clusters: list[Cluster]) -> Result:
@@ -187,12 +216,39 @@ class Tracker:
         total = weight * np.array(tracked.as_tuple()) + detections.boxes[near].sum(axis=0)
         return Box(*map(float, total / (weight + np.count_nonzero(near))))
 
-    def _learn(self, frame: Frame, box: Box, detections: Detections) -> None:
+    def _align(self, frame: Frame, box: Box, detections: Detections) -> Box:
+        import os
+        step = float(os.environ.get("ASTEP", 0.06)); gain = float(os.environ.get("AGAIN", 0.3)); mode = os.environ.get("AMODE", "conservative")
+        rounds = int(os.environ.get("AROUNDS", 2)); minsim = float(os.environ.get("AMIN", 0.8))
+        if gain <= 0: return box
+        center = np.array(box.as_tuple())
+        best = center
+        offs = np.array([(x, y, s) for s in (-1, 0, 1) for y in (-1, 0, 1) for x in (-1, 0, 1)], float)
+        for r in range(rounds):
+            h = step * 0.5**r
+            c = best[:2] + best[2:] / 2
+            wh = best[2:] * (1 + h) ** offs[:, 2:3]
+            cc = c + offs[:, :2] * h * best[2:]
+            boxes = np.concatenate([cc - wh / 2, wh], axis=1)
+            m = self._detector.model
+            if mode == "first":
+                v = 0.5 + 0.5 * _bp(frame.patches(boxes), m.positives.patches[: (len(m.positives) + 1) // 2])
+            else:
+                v = m.similarity(frame.patches(boxes)).positive
+            k = int(np.argmax(v))
+            if v[k] > v[13] + 1e-6:
+                best = boxes[k]
+        if v[k] < minsim: return box
+        out = center + gain * (best - center)
+        return Box(*map(float, out))
+
+    def _learn(self, frame: Frame, result: Result, detections: Detections) -> None:
         """Train on a valid frame, unless the view has changed too fast or shows too little."""
-        if box.inside_fraction(frame.width, frame.height) < 0.9:
-            return
-        relative, _ = self._similarity(frame, box)
-        if relative < self._parameters.negative_threshold:
+        import os
+        LEARN = float(os.environ.get("LEARN", 0.5))
+        box = result.box
+        if self._coherent < int(os.environ.get("MCOH", 1)): return
+        if box.inside_fraction(frame.width, frame.height) < 0.9 or result.confidence < LEARN:
             return
         if frame.variance(np.array(box.as_tuple())) < self._detector.min_variance:
             return
