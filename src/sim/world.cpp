@@ -166,6 +166,7 @@ World LoadWorld(const std::string& file, const Resources& resources, const Warni
   if (!std::filesystem::is_regular_file(file, error)) {
     throw std::runtime_error("cannot read the world '" + file + "': no such file");
   }
+  sdf::Console::Instance()->SetQuiet(true);  // What it has to say comes back as errors.
   sdf::Root root;
   const sdf::Errors errors = root.Load(file, MakeParser(resources));
   if (!errors.empty()) {

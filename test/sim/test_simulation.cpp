@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The whole: worlds, timing, truth, determinism, reset.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sim/distance.h"
+#include "support.h"
+
+namespace tld_follower::sim {
+namespace {
+
+// Everything that one run shows: images of some frames, and the last poses, byte by byte.
+std::vector<uint8_t> Record(Simulation* simulation) {
+  std::vector<uint8_t> record;
+  StereoImages images;
+  const auto append = [&record](const void* data, size_t size) {
+    const auto* bytes = static_cast<const uint8_t*>(data);
+    record.insert(record.end(), bytes, bytes + size);
+  };
+  while (simulation->frame() < 150) {
+    if (!simulation->Advance().frame) continue;
+    const double wave = std::sin(double(simulation->frame()) * 0.1);
+    simulation->spiri().Command({btScalar(0.8 * wave), 0, 0}, 0.3 * wave, simulation->time());
+    simulation->husky().Command(0.7, 0.5 * wave, simulation->time());
+    if (simulation->frame() % 30 == 0) {
+      simulation->Render(&images, nullptr);
+      append(images.left.data(), images.left.size());
+      append(images.right.data(), images.right.size());
+    }
+  }
+  for (const Body& body : {simulation->spiri().body(), simulation->husky().chassis()}) {
+    const btTransform pose = body.Pose();
+    append(&pose.getOrigin(), 3 * sizeof(btScalar));
+    const btVector3 velocity = body.Velocity();
+    append(&velocity, 3 * sizeof(btScalar));
+  }
+  const btVector3 odometry = simulation->sensors().odometry().pose.getOrigin();
+  append(&odometry, 3 * sizeof(btScalar));
+  return record;
+}
+
+TEST(Simulation, RunsAreBitIdenticalAlsoAfterAReset) {
+  SimulationConfig config;
+  config.world_file = WorldFile("testing_grounds.world");
+  config.camera.width = 320;
+  config.camera.height = 240;
+  config.seed = 5;
+  Simulation first(config, ThrowWarning);
+  const std::vector<uint8_t> record = Record(&first);
+  Simulation second(config, ThrowWarning);
+  EXPECT_EQ(Record(&second), record) << "a fresh simulation differs";
+  first.Reset();
+  EXPECT_EQ(first.time_ns(), 0);
+  EXPECT_EQ(Record(&first), record) << "a reset simulation differs";
+  config.seed = 6;
+  Simulation other(config, ThrowWarning);
+  EXPECT_NE(Record(&other), record) << "the seed does nothing";
+}
+
+TEST(Simulation, FramesFallOnTheNearestPhysicsStep) {
+  Simulation simulation(FlightConfig(), ThrowWarning);
+  int ticks = 0;
+  while (simulation.time() < 2) {
+    const Moment moment = simulation.Advance();
+    ticks += moment.tick;
+    if (moment.frame) {
+      EXPECT_NEAR(simulation.time(), double(simulation.frame()) / 30, 0.001 + 1e-9);
+    }
+  }
+  EXPECT_EQ(simulation.frame(), 60u);
+  EXPECT_EQ(ticks, 200);
+}
+
+TEST(Simulation, StartsOneMetreBehindTheTarget) {
+  Simulation simulation(FlightConfig("testing_grounds.world"), ThrowWarning);
+  RunUntil(8, &simulation);
+  const Truth truth = simulation.Measure();
+  EXPECT_NEAR(truth.distance, 1.0, 0.01);
+  EXPECT_NEAR(truth.clearance, 0.61, 0.01);  // The ground; half the drone's height is 0.04 m.
+}
+
+TEST(Simulation, TargetFillsTheMiddleOfTheFirstView) {
+  SimulationConfig config;
+  config.world_file = WorldFile("testing_grounds.world");
+  Simulation simulation(config, ThrowWarning);
+  RunUntil(6, &simulation);
+  StereoImages images;
+  TargetMask mask;
+  simulation.Render(&images, &mask);
+  EXPECT_NEAR(mask.x + mask.width / 2.0, 320, 25);
+  EXPECT_GT(mask.width, 250);
+  EXPECT_LT(mask.width, 400);
+  EXPECT_GT(mask.pixels, mask.width * mask.height / 2);
+}
+
+TEST(Simulation, LaneStaysFree) {
+  const std::string file = WorldFile("testing_grounds.world");
+  const World world = LoadWorld(file, Resources::ForWorld(file), ThrowWarning);
+  const Physics physics(world);
+  btBoxShape lane({17, btScalar(2.5), btScalar(1.45)});
+  const btTransform middle(btQuaternion::getIdentity(), {13, 0, btScalar(1.5)});
+  for (int i = 0; i < physics.objects().size(); ++i) {
+    const btCollisionObject* object = physics.objects()[i];
+    EXPECT_GT(Distance(lane, middle, *object->getCollisionShape(), object->getWorldTransform()), 0);
+  }
+}
+
+TEST(Simulation, CountsTouchesOfTheDrone) {
+  SimulationConfig config = FlightConfig();
+  config.husky_place = Placement{1.5, 0, 0};
+  config.spiri_place = Placement{0, 0, 0};
+  config.spiri.take_off_altitude = 0.2;  // Low enough to run into the body.
+  Simulation simulation(config, ThrowWarning);
+  RunUntil(5, &simulation);
+  EXPECT_EQ(simulation.Measure().collisions, 0u);
+  RunUntil(9, &simulation, [&] { simulation.spiri().Command({1, 0, 0}, 0, simulation.time()); });
+  const Truth truth = simulation.Measure();
+  EXPECT_GE(truth.collisions, 1u);
+  EXPECT_LT(truth.clearance, 0.1);
+}
+
+TEST(Distance, IsExactForKnownArrangements) {
+  btBoxShape box({btScalar(0.5), btScalar(0.25), btScalar(0.1)});
+  box.setMargin(btScalar(0.002));
+  btCollisionObject object;
+  object.setCollisionShape(&box);
+  object.setWorldTransform(btTransform(btQuaternion::getIdentity(), {1, 0, 0}));
+  EXPECT_NEAR(Distance({-1, 0, 0}, object), 1.5, 0.002);
+  EXPECT_NEAR(Distance({btScalar(-0.5), btScalar(1.25), 0}, object), std::sqrt(2.0), 0.003);
+  EXPECT_LE(Distance({1, 0, 0}, object), 0);
+  btStaticPlaneShape ground({0, 0, 1}, 0);
+  const btTransform tilted(btQuaternion(btVector3(0, 1, 0), btScalar(M_PI / 2)), {0, 0, 2});
+  EXPECT_NEAR(Distance(ground, btTransform::getIdentity(), box, tilted), 1.5, 0.002);
+}
+
+std::string ErrorOf(const std::string& world_file) {
+  SimulationConfig config = FlightConfig();
+  config.world_file = world_file;
+  try {
+    Simulation simulation(config, ThrowWarning);
+  } catch (const std::exception& problem) {
+    return problem.what();
+  }
+  return "";
+}
+
+TEST(World, ProblemsAreOneClearSentence) {
+  EXPECT_NE(ErrorOf("/no/such.world").find("no such file"), std::string::npos);
+  const TemporaryFile text("text.world", "this is no SDF");
+  EXPECT_NE(ErrorOf(text.path()).find("cannot read the world"), std::string::npos);
+  const TemporaryFile no_world("model.world", "<sdf version='1.6'></sdf>");
+  EXPECT_NE(ErrorOf(no_world.path()).find("no <world>"), std::string::npos);
+  const TemporaryFile no_robots("bare.world",
+                                "<sdf version='1.6'><world name='bare'></world></sdf>");
+  EXPECT_NE(ErrorOf(no_robots.path()).find("spiri"), std::string::npos);
+  const TemporaryFile unknown(
+      "unknown.world",
+      "<sdf version='1.6'><world name='w'><include><uri>model://no_robot.urdf</uri></include>"
+      "</world></sdf>");
+  EXPECT_NE(ErrorOf(unknown.path()).find("no_robot"), std::string::npos);
+}
+
+TEST(World, ReadsPosesMaterialsAndRobots) {
+  const std::string file = WorldFile("testing_grounds.world");
+  Warnings warnings;
+  const World world = LoadWorld(file, Resources::ForWorld(file), warnings.Sink());
+  EXPECT_TRUE(warnings.lines.empty());
+  EXPECT_GT(world.models.size(), 20u);
+  EXPECT_EQ(world.models[0].visuals[0].material.texture_size, 3.0);
+  EXPECT_EQ(world.models[0].visuals[0].material.light_map, "media/ground_map.png");
+  EXPECT_NEAR(world.Robot("spiri").pose.getOrigin().x(), -1.5, 1e-6);
+  EXPECT_THROW(world.Robot("rover"), std::runtime_error);
+}
+
+TEST(Robot, HuskyHasItsWheelsAndMass) {
+  const Robot robot = LoadRobot(WorldFile("husky.urdf"));
+  double mass = 0;
+  for (const RobotLink& link : robot.links) mass += link.mass;
+  EXPECT_NEAR(mass, 46.034 + 4 * 2.637, 1e-6);
+  EXPECT_NEAR(robot.MovedBy("rear_right_wheel").pose.getOrigin().y(), -0.2854, 1e-6);
+  EXPECT_THROW(robot.MovedBy("fifth_wheel"), std::runtime_error);
+  EXPECT_THROW(LoadRobot("/no/such.urdf"), std::runtime_error);
+  const TemporaryFile broken("broken.urdf", "<robot name='r'><link name='a'>");
+  EXPECT_THROW(LoadRobot(broken.path()), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace tld_follower::sim
