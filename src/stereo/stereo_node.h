@@ -47,6 +47,8 @@ class StereoNode {
 
   /// One camera: what it sent last, and the buffers that outlive a frame.
   struct Eye {
+    explicit Eye(const char* camera_name) : name(camera_name) {}
+
     std::string name;
     Calibration calibration;
     Encoding encoding = Encoding::kMono;
