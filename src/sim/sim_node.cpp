@@ -114,16 +114,17 @@ void SimNode::OnCommand(const geometry_msgs::Twist& twist) {
   commanded_ = true;
   const btVector3 velocity(btScalar(twist.linear.x), btScalar(twist.linear.y),
                            btScalar(twist.linear.z));
-  if (!simulation_.spiri().Command(velocity, twist.angular.z, simulation_.time())) {
-    ROS_WARN("/cmd_vel is not finite; hovering");
-  }
+  const bool finite = simulation_.spiri().Command(velocity, twist.angular.z, simulation_.time());
+  if (!finite && command_finite_) ROS_WARN("/cmd_vel is not finite; hovering");
+  command_finite_ = finite;
 }
 
 void SimNode::OnTargetCommand(const geometry_msgs::Twist& twist) {
   target_commanded_ = true;
-  if (!simulation_.husky().Command(twist.linear.x, twist.angular.z, simulation_.time())) {
-    ROS_WARN("/husky/cmd_vel is not finite; stopping");
-  }
+  const bool finite =
+      simulation_.husky().Command(twist.linear.x, twist.angular.z, simulation_.time());
+  if (!finite && target_command_finite_) ROS_WARN("/husky/cmd_vel is not finite; stopping");
+  target_command_finite_ = finite;
 }
 
 bool SimNode::OnPause(Empty::Request&, Empty::Response&) {
@@ -176,6 +177,7 @@ bool SimNode::OnStep(tld_follower::Step::Request& request, tld_follower::Step::R
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "gazebo");
+  ros::start();  // Or the end of the node's last handle would silence the message below.
   try {
     tld_follower::sim::SimNode().Run();
   } catch (const std::exception& problem) {
