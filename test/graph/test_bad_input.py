@@ -81,10 +81,11 @@ class BadInputTest(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("bad_input_test")
         cls.changed = threading.Condition()
-        cls.seen = {"box": {}, "state": {}, "log": [], "command": 0, "target": 0}
+        cls.seen = {"box": {}, "state": {}, "log": [], "command": 0, "states": 0, "target": 0}
         cls.camera = Camera(distance=1.25)
         rospy.Subscriber("/pointA", BoundingBox, lambda m: cls.note("box", m.captured, m))
         rospy.Subscriber("/pointsdepthA/state", FollowState, lambda m: cls.note("state", m.header.stamp, m))
+        rospy.Subscriber("/pointsdepthA/state", FollowState, lambda m: cls.count("states"))
         rospy.Subscriber("/NODE/target", RegionOfInterest, lambda m: cls.count("target"))
         rospy.Subscriber("/cmd_vel", Twist, lambda m: cls.count("command"))
         rospy.Subscriber("/rosout", Log, cls.read)
@@ -266,12 +267,11 @@ class BadInputTest(unittest.TestCase):
         self.assert_follows()
 
     def test_one_command_for_every_box(self):
-        commands, states = self.seen["command"], len(self.seen["state"])
+        states = self.seen["states"]
         for _ in range(30):
             self.state()
-        self.wait(
-            lambda: self.seen["command"] - commands == len(self.seen["state"]) - states == 30, "30 commands"
-        )
+        self.assertEqual(self.seen["states"] - states, 30)
+        self.wait(lambda: self.seen["command"] == self.seen["states"], "as many commands as boxes")
 
 
 if __name__ == "__main__":

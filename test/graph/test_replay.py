@@ -10,13 +10,15 @@ from pathlib import Path
 
 import rosbag
 import rospy
+from geometry_msgs.msg import Twist
 from std_srvs.srv import Empty
 
 from tld_follower.evaluation.graph import FLYING_EDGES, edges, launched, private_master, stop, wait_for_edges
 from tld_follower.msg import BoundingBox, Truth
 from tld_follower.srv import Step
 
-SECONDS = 5.0  # of flight
+TAKE_OFF = 120  # frames
+SECONDS = 5.0  # of flight that is recorded
 WAIT = 120.0  # s of wall-clock time, a generous bound
 RECORDED = ["/stereo/left/image_raw", "/pointA", "/stereo/left/camera_info", "/stereo/right/image_raw"]
 
@@ -57,11 +59,16 @@ class ReplayTest(unittest.TestCase):
         rospy.Subscriber("/gazebo/truth", Truth, truths.append)
         rospy.Subscriber("/pointA", BoundingBox, newest.append)
         wait_for_edges({("/gazebo", "/gazebo/truth", rospy.get_name())}, timeout=WAIT)
-        # One frame without the tracker tells where the target stands.
+        # Take-off without the tracker; where the target then stands is what it is shown.
+        hover = rospy.Publisher("/cmd_vel", Twist, queue_size=1)
+        answer = rospy.Subscriber("/gazebo/truth", Truth, lambda _: hover.publish(Twist()))
+        wait_for_edges({(rospy.get_name(), "/cmd_vel", "/gazebo")}, timeout=WAIT)
         rospy.wait_for_service("/gazebo/step", timeout=WAIT)
-        self.assertTrue(rospy.ServiceProxy("/gazebo/step", Step)(1).success)
-        wait_for(lambda: truths, "the first frame")
-        box = truths[0].target_box
+        self.assertTrue(rospy.ServiceProxy("/gazebo/step", Step)(TAKE_OFF).success)
+        wait_for(lambda: len(truths) == TAKE_OFF, "the take-off")
+        answer.unregister()
+        hover.unregister()
+        box = truths[-1].target_box
         self.assertTrue(box.visible)
 
         bag = self.folder / "flight.bag"
@@ -79,7 +86,7 @@ class ReplayTest(unittest.TestCase):
                     "the recorder",
                 )
                 rospy.ServiceProxy("/gazebo/unpause_physics", Empty)()
-                wait_for(lambda: newest and newest[-1].captured.to_sec() > SECONDS, "the flight")
+                wait_for(lambda: newest and len(newest) > SECONDS * 30, "the flight")
                 rospy.ServiceProxy("/gazebo/pause_physics", Empty)()
                 recording()
             alive()

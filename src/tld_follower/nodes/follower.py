@@ -73,7 +73,7 @@ class FollowerNode:
         try:
             box = message_box(message.box)
         except ValueError as error:
-            rospy.logerr_throttle(5.0, f"box ignored: {error}")
+            rospy.logerr_throttle_identical(5.0, f"box ignored: {error}")
             box = None
         state = self._follower.update(box, message.box.target, (now - stamp).to_sec(), points, cloud_age)
         self._publish(message.header, state)
@@ -106,7 +106,7 @@ class FollowerNode:
                     f"{self._parameters.image_width}x{self._parameters.image_height} pixels"
                 )
         except ValueError as error:
-            rospy.logerr_throttle(5.0, f"cloud ignored: {error}")
+            rospy.logerr_throttle_identical(5.0, f"cloud ignored: {error}")
             return None
         return points
 

@@ -86,7 +86,7 @@ class TrackerNode:
                 result = self._tracker.update(grey)
                 box, confidence = result.box, result.confidence
         except ValueError as error:
-            rospy.logerr_throttle(5.0, f"image skipped: {error}")
+            rospy.logerr_throttle_identical(5.0, f"image skipped: {error}")
         self._boxes.publish(box_message(box, confidence, stamp, self._targets))
         if self._view.get_num_connections():
             self._publish_view(message, box, confidence)
