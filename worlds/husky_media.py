@@ -57,7 +57,7 @@ def shell():
     paint.stripes(rear, 40, 60, 230, 130, 34, ((24, 24, 24), YELLOW))
     cv2.circle(rear, (820, 128), 70, (0.9, 0.9, 0.9), -1, cv2.LINE_AA)
     cv2.circle(rear, (820, 128), 56, (0.12, 0.1, 0.75), -1, cv2.LINE_AA)
-    paint.label(rear, "STOP", 780, 142, 30, (235, 235, 235), 4)
+    paint.label(rear, "STOP", 783, 138, 22, (235, 235, 235), 3)
     for x in (925, 965):
         cv2.rectangle(rear, (x, 80), (x + 26, 176), (0.12, 0.12, 0.12), -1)
 
@@ -173,7 +173,7 @@ def shell_mesh():
         # Seen from outside: left to right is +x for the right side, -x for the left side.
         a, b = side * foot, -side * foot
         c, d = side * top, -side * top
-        mesh.quad((a, w, -0.06), (b, w, -0.06), (d, w, flare), (c, w, flare), strip["side"])
+        mesh.quad((a, w, 0.0), (b, w, 0.0), (d, w, flare), (c, w, flare), strip["side"])
         mesh.quad((c, y, flare), (d, y, flare), (d, y, DECK), (c, y, DECK), (0.0, 0.05, 1.0, 0.1))
         mesh.quad(
             (d, w, flare), (d, y, flare), (c, y, flare), (c, w, flare), (0.0, 0.0, 1.0, 0.1), flip=side > 0
@@ -234,12 +234,11 @@ def bumper_mesh():
 
 
 def frame_mesh():
-    """Black parts: the tub under the body and the brackets of the bumpers."""
+    """Build the black parts: the floor of the body and what carries the axles."""
     mesh = Obj()
-    mesh.box((0, 0, -0.075), (0.80, 0.40, 0.04), 2.0)
+    mesh.box((0, 0, 0.006), (0.84, 0.42, 0.012), 2.0)
     for end in (1, -1):
-        for side in (1, -1):
-            mesh.box((end * 0.40, side * 0.10, 0.02), (0.09, 0.05, 0.07), 2.0)
+        mesh.box((end * 0.256, 0, 0.03282), (0.06, 0.52, 0.05), 2.0)
     return mesh
 
 

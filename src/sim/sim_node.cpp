@@ -8,6 +8,7 @@ namespace {
 
 const ros::WallDuration kIdle(0.01);   // How long a paused loop sleeps.
 const ros::WallDuration kPoll(0.001);  // How long a waiting loop goes without serving services.
+constexpr double kCatchUp = 0.1;       // Lateness up to this is made up for, more is let go [s].
 constexpr double kSlipWarningPeriod = 5.0;  // [s]
 
 void Warn(const std::string& message) { ROS_WARN_STREAM(message); }
@@ -93,7 +94,7 @@ double SimNode::SecondsAhead() {
   if (parameters_.mode != Mode::kRealtime) return 0;
   const ros::WallTime now = ros::WallTime::now();
   const double ahead = (simulation_.time() - anchor_time_) - (now - anchor_wall_).toSec();
-  if (ahead > -1.0 / parameters_.simulation.frame_rate) return ahead;
+  if (ahead > -kCatchUp) return ahead;
   anchor_time_ = simulation_.time();
   anchor_wall_ = now;
   if ((now - last_slip_warning_).toSec() > kSlipWarningPeriod) {
@@ -106,7 +107,7 @@ double SimNode::SecondsAhead() {
 
 void SimNode::RestartTime() {
   anchor_time_ = simulation_.time();
-  anchor_wall_ = ros::WallTime::now();
+  anchor_wall_ = frame_published_ = ros::WallTime::now();
   publishers_.RestartStopwatch();
 }
 
@@ -163,6 +164,7 @@ bool SimNode::OnStep(tld_follower::Step::Request& request, tld_follower::Step::R
     response.message = "the simulation is running; call pause_physics first";
     return true;
   }
+  RestartTime();
   const uint64_t last = simulation_.frame() + request.frames;
   while (ros::ok() && simulation_.frame() < last) {
     commands_.callAvailable(waiting_ ? kPoll : ros::WallDuration(0));
