@@ -74,7 +74,8 @@ Geometry ReadGeometry(const sdf::Geometry& geometry, const std::string& owner) {
 Material ReadMaterial(const sdf::Material* material) {
   Material result;
   if (material == nullptr) return result;
-  result.colour = ToRgb(material->Diffuse());
+  // SDF's own default is black, which would hide a texture.
+  if (material->Element()->HasElement("diffuse")) result.colour = ToRgb(material->Diffuse());
   if (const sdf::Pbr* pbr = material->PbrMaterial()) {
     if (const sdf::PbrWorkflow* metal = pbr->Workflow(sdf::PbrWorkflowType::METAL)) {
       result.texture = metal->AlbedoMap();

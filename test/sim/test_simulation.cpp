@@ -173,6 +173,37 @@ TEST(World, ReadsPosesMaterialsAndRobots) {
   EXPECT_THROW(world.Robot("rover"), std::runtime_error);
 }
 
+TEST(World, ReadsFrictionAndColourAndFillsInWhatIsLeftOut) {
+  const std::string text = R"(<sdf version='1.6'><world name='w'>
+      <model name='m'><static>true</static><pose>1 2 0 0 0 1.5707963</pose><link name='l'>
+        <pose>1 0 0 0 0 0</pose>
+        <collision name='c'><geometry><box><size>1 2 3</size></box></geometry>
+          <surface><friction><ode><mu>0.25</mu></ode></friction></surface></collision>
+        <collision name='d'><geometry><sphere><radius>0.5</radius></sphere></geometry></collision>
+        <visual name='v'><geometry><box><size>1 2 3</size></box></geometry>
+          <material><diffuse>1 0.5 0 1</diffuse></material></visual>
+        <visual name='u'><geometry><cylinder><radius>0.1</radius><length>2</length></cylinder>
+          </geometry><material><pbr><metal><albedo_map>a.png</albedo_map></metal></pbr></material>
+        </visual></link></model></world></sdf>)";
+  const TemporaryFile file("w.world", text);
+  const World world = LoadWorld(file.path(), Resources({}), ThrowWarning);
+  const StaticModel& model = world.models.at(0);
+  EXPECT_NEAR(model.collisions[0].friction, 0.25, 1e-9);
+  EXPECT_NEAR(model.collisions[1].friction, 1.0, 1e-9);
+  EXPECT_LT((model.collisions[0].pose.getOrigin() - btVector3(1, 3, 0)).length(), 1e-5);
+  EXPECT_NEAR(model.visuals[0].material.colour[1], 0.5, 1e-6);
+  EXPECT_EQ(model.visuals[1].material.colour[1], 1.f);
+  EXPECT_EQ(model.visuals[1].material.texture, "a.png");
+
+  Warnings warnings;
+  const std::string loose =
+      "<sdf version='1.6'><world name='w'><model name='m'><link name='l'/>"
+      "</model></world></sdf>";
+  const TemporaryFile moving("loose.world", loose);
+  LoadWorld(moving.path(), Resources({}), warnings.Sink());
+  EXPECT_EQ(warnings.lines.size(), 1u);
+}
+
 TEST(Robot, HuskyHasItsWheelsAndMass) {
   const Robot robot = LoadRobot(WorldFile("husky.urdf"));
   double mass = 0;
