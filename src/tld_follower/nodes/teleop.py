@@ -80,7 +80,6 @@ def drive(keyboard, publisher, period):
             moved = keyboard.moving
     finally:
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, settings)
-        publisher.publish(Twist())
 
 
 def main():
@@ -100,6 +99,7 @@ def main():
         rospy.spin()
         return
     print(HELP, flush=True)
+    rospy.on_shutdown(lambda: publisher.publish(Twist()))
     # A wall-clock period well inside Husky's command timeout of 0.25 s; ROS time may stand still.
     worker = threading.Thread(target=drive, args=(keyboard, publisher, 0.1), daemon=True)
     worker.start()
