@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "sim/distance.h"
 #include "support.h"
@@ -171,6 +172,14 @@ TEST(World, ReadsPosesMaterialsAndRobots) {
   EXPECT_EQ(world.models[0].visuals[0].material.light_map, "media/ground_map.png");
   EXPECT_NEAR(world.Robot("spiri").pose.getOrigin().x(), -1.5, 1e-6);
   EXPECT_THROW(world.Robot("rover"), std::runtime_error);
+}
+
+TEST(World, MayLieAnywhere) {
+  std::ifstream original(WorldFile("empty.world"));
+  std::stringstream text;
+  text << original.rdbuf();
+  const TemporaryFile copy("anywhere.world", text.str());
+  EXPECT_EQ(ErrorOf(copy.path()), "");
 }
 
 TEST(World, ReadsFrictionAndColourAndFillsInWhatIsLeftOut) {
