@@ -44,7 +44,7 @@ def test_holds_at_the_set_distance():
 
 
 @pytest.mark.parametrize(
-    ("distance", "speed"), [(1.15, 0.5), (1.3, 1.0), (3.0, 1.0), (0.85, -0.5), (0.7, -1.0)]
+    ("distance", "speed"), [(1.3, 0.5), (1.6, 1.0), (3.0, 1.0), (0.85, -0.25), (0.7, -0.5)]
 )
 def test_distance_error_maps_to_forward_speed(distance, speed):
     assert step(Follower(PARAMETERS), cloud=scene(distance)).command.x == pytest.approx(speed, abs=1e-5)
