@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The detector: scanning windows through variance gate, ferns and nearest neighbour (thesis section 3.1.2)."""
+"""The detector: windows through variance gate, ferns and nearest neighbour (thesis section 3.1.2)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,13 @@ class Detections(Candidates):
 
 @dataclass(frozen=True)
 class Cluster:
-    """Detections of one place: their weighted mean box and the best relative similarity among them."""
+    """Detections of one place.
+
+    Attributes
+    ----------
+    box : their mean, weighted by relative similarity [pixel].
+    confidence, conservative : the best relative and the best conservative similarity among them.
+    """
 
     box: Box
     confidence: float
@@ -90,7 +96,9 @@ class Detector:
         self._phase = (self._phase + 1) % stride
         filled, boxes = 0, []
         for size in active:
-            start, filled = filled, self._scan_size(frame, size, around, threshold, (stride, self._phase), filled)
+            start = filled
+            sparse = (stride, self._phase)
+            filled = self._scan_size(frame, size, around, threshold, sparse, start)
             boxes.append(size.boxes(self._corners[start:filled]))
         order = np.argsort(-self._confidences[:filled], kind="stable")
         return Candidates(
@@ -100,8 +108,15 @@ class Detector:
         )
 
     def _scan_size(
-        self, frame: Frame, size: WindowSize, around: Box, threshold: float, sparse: tuple[int, int], filled: int
+        self,
+        frame: Frame,
+        size: WindowSize,
+        around: Box,
+        threshold: float,
+        sparse: tuple[int, int],
+        filled: int,
     ) -> int:
+        """Scan the windows of one size; returns the number of rows filled so far, see `scan_windows`."""
         level = frame.level(size.octave)
         if level.gray.shape[0] < size.grid[1] or level.gray.shape[1] < size.grid[0]:
             return filled
@@ -131,19 +146,23 @@ class Detector:
         )
 
     def clusters(self, detections: Detections) -> list[Cluster]:
-        """Group the detections above the nearest-neighbour threshold by overlap, the most confident first."""
-        accepted = np.flatnonzero(detections.similarity.relative > self.nn_threshold)
-        if len(accepted) == 0:
-            return []
-        boxes = detections.boxes[accepted]
-        weights = detections.similarity.relative[accepted]
+        """Group the detections that may be the target by overlap, the most confident first.
+
+        Their relative similarity is at most `redetection_margin` under the threshold; clusters that the early
+        templates do not support (`min_conservative`) are left out.
+        """
+        parameters = self._parameters
+        similarity = detections.similarity
+        accepted = np.flatnonzero(similarity.relative > self.nn_threshold - parameters.redetection_margin)
+        boxes, weights = detections.boxes[accepted], similarity.relative[accepted]
         labels = label_clusters(boxes, CLUSTER_OVERLAP)
         clusters = []
-        for label in range(labels.max() + 1):
+        for label in range(labels.max(initial=-1) + 1):
             members = labels == label
             mean = np.average(boxes[members], axis=0, weights=weights[members])
-            conservative = detections.similarity.conservative[accepted][members].max()
-            clusters.append(Cluster(Box(*map(float, mean)), float(weights[members].max()), float(conservative)))
+            conservative = float(similarity.conservative[accepted][members].max())
+            if conservative > parameters.min_conservative:
+                clusters.append(Cluster(Box(*map(float, mean)), float(weights[members].max()), conservative))
         return sorted(clusters, key=lambda c: -c.confidence)
 
 

@@ -16,6 +16,7 @@ from tld_follower.tld.parameters import Parameters
 LK_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.03)
 # Dark targets have small gradients; the forward-backward error judges the points, not their contrast.
 LK_MIN_EIGENVALUE = 1e-6
+MIN_POINTS = 4
 
 
 @dataclass(frozen=True)
@@ -27,26 +28,32 @@ class Flow:
     box : the moved and scaled box [pixel].
     error : median forward-backward error over the side of the box (sqrt of its area).
     residual : median distance of the points from the motion found, over the same side; large at occlusion.
-    points : (N, 2) float32, the reliable points in the new image [pixel].
     """
 
     box: Box
     error: float
     residual: float
-    points: np.ndarray
 
 
-def track(previous: Frame, current: Frame, box: Box, points: np.ndarray, parameters: Parameters) -> Flow | None:
+def track(
+    previous: Frame,
+    current: Frame,
+    box: Box,
+    points: np.ndarray,
+    parameters: Parameters,
+    guess: tuple[float, float] = (0.0, 0.0),
+) -> Flow | None:
     """Move a box from one frame to the next.
 
-    Points go forward and back by pyramidal Lucas-Kanade; those with a forward-backward error (eq. 3.2) above the
-    median or an NCC (eq. 3.3) under the median are dropped. The box moves by the median displacement and scales
-    by the median ratio of the distances between pairs of points.
+    Points go forward and back by pyramidal Lucas-Kanade; those with a forward-backward error (eq. 3.2) above
+    the median or an NCC (eq. 3.3) under the median are dropped. The box moves by the median displacement and
+    scales by the median ratio of the distances between pairs of points.
 
     Parameters
     ----------
     box : the target in `previous` [pixel].
     points : (N, 2) float32 in `previous` [pixel].
+    guess : displacement to start the search from [pixel].
 
     Returns
     -------
@@ -54,22 +61,25 @@ def track(previous: Frame, current: Frame, box: Box, points: np.ndarray, paramet
     """
     side = np.sqrt(box.area)
     # A large target is tracked on a smaller octave: the same points, a wider reach, bounded cost.
-    octave = max(0, int(np.floor(np.log2(max(side / parameters.flow_side, 1.0)))))
+    octave = max(0, int(np.floor(np.log2(side / parameters.flow_side))))
     before, after, factor, origin = _crops(previous, current, box, octave, parameters)
     start = (np.ascontiguousarray(points, np.float32) / factor - origin - 0.5).reshape(-1, 1, 2)
+    shift = np.array(guess, np.float32) / factor
     options = {
         "winSize": (parameters.lk_window, parameters.lk_window),
         "maxLevel": parameters.lk_levels,
         "criteria": LK_CRITERIA,
+        "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
         "minEigThreshold": LK_MIN_EIGENVALUE,
     }
-    end, found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, None, **options)
-    back, returned, _ = cv2.calcOpticalFlowPyrLK(after, before, end, None, **options)
+    end, found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, start + shift, **options)
+    back, returned, _ = cv2.calcOpticalFlowPyrLK(after, before, end, end - shift, **options)
     start, end, back = start[:, 0], end[:, 0], back[:, 0]
     height, width = after.shape
-    good = (found[:, 0] & returned[:, 0]).astype(bool)
+    good = np.isfinite(end).all(axis=1) & np.isfinite(back).all(axis=1)
+    good &= (found[:, 0] & returned[:, 0]).astype(bool)
     good &= (end[:, 0] >= 0) & (end[:, 1] >= 0) & (end[:, 0] <= width - 1) & (end[:, 1] <= height - 1)
-    if np.count_nonzero(good) < 4:
+    if np.count_nonzero(good) < MIN_POINTS:
         return None
     start, end, back = start[good], end[good], back[good]
     distance = np.hypot(*(start - back).T)
@@ -77,21 +87,17 @@ def track(previous: Frame, current: Frame, box: Box, points: np.ndarray, paramet
     if error > parameters.max_fb_error:
         return None
     similarity = patch_ncc(before, after, start, end, parameters.flow_patch)
-    every_start, every_end = start, end
-    kept = (distance <= np.median(distance)) & (similarity >= np.median(similarity))
-    if np.count_nonzero(kept) < 4:
-        kept = distance <= np.median(distance)
-    start, end = start[kept], end[kept]
-    shift = np.median(end - start, axis=0) * factor
-    scale = median_scale(start, end)
-    center_x, center_y = box.center
-    moved = Box.from_center(
-        center_x + float(shift[0]), center_y + float(shift[1]), box.width * scale, box.height * scale
-    )
-    middle = np.median(start, axis=0)
-    expected = every_start + (scale - 1.0) * (every_start - middle) + shift / factor
-    residual = float(np.median(np.hypot(*(every_end - expected).T))) * factor / side
-    return Flow(moved, error, residual, (end + origin + 0.5) * factor)
+    kept = distance <= np.median(distance)
+    similar = kept & (similarity >= np.median(similarity))
+    if np.count_nonzero(similar) >= MIN_POINTS:
+        kept = similar
+    shift = np.median(end[kept] - start[kept], axis=0)
+    scale = median_scale(start[kept], end[kept])
+    expected = start + shift + (scale - 1.0) * (start - np.median(start[kept], axis=0))
+    residual = float(np.median(np.hypot(*(end - expected).T))) * factor / side
+    center_x, center_y = np.array(box.center) + shift * factor
+    moved = Box.from_center(float(center_x), float(center_y), box.width * scale, box.height * scale)
+    return Flow(moved, error, residual)
 
 
 def _crops(previous: Frame, current: Frame, box: Box, octave: int, parameters: Parameters):
@@ -99,7 +105,8 @@ def _crops(previous: Frame, current: Frame, box: Box, octave: int, parameters: P
 
     Returns
     -------
-    both crops, the octave's pixel size [pixel of the image], and the crop's origin (x, y) [pixel of the octave].
+    both crops, the octave's pixel size [pixel of the image], and the crop's origin (x, y) [pixel of the
+    octave].
     """
     before, after = previous.level(octave).gray, current.level(octave).gray
     factor = round(previous.height / before.shape[0])

@@ -31,8 +31,8 @@ class Similarity:
 class Templates:
     """A bounded list of normalised patches in the order of time.
 
-    When full, one of the two most similar templates goes, so that the most different stay; the first `protected`
-    always stay.
+    When full, one of the two most similar templates goes, so that the most different stay; the first
+    `protected` always stay.
 
     Parameters
     ----------
@@ -105,6 +105,10 @@ class ObjectModel:
         positive = np.maximum(first, rest)
         negative = 0.5 + 0.5 * best_products(patches, self.negatives.patches)
         return Similarity(_relative(positive, negative), _relative(first, negative), positive, negative)
+
+    def positive_similarity(self, patches: np.ndarray) -> np.ndarray:
+        """Return S+ (N,) of patches (N, 225), normalised."""
+        return 0.5 + 0.5 * best_products(np.ascontiguousarray(patches, np.float32), self.positives.patches)
 
 
 def _relative(positive: np.ndarray, negative: np.ndarray) -> np.ndarray:

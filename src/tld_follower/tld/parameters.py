@@ -21,7 +21,7 @@ class Parameters:
     grid_points: int = 10
     lk_window: int = 9
     lk_levels: int = 3
-    flow_side: float = 96.0
+    flow_side: float = 32.0
     flow_patch: int = 10
     max_fb_error: float = 0.25
 
@@ -40,8 +40,8 @@ class Parameters:
     max_candidates: int = 100
 
     nn_threshold: float = 0.65
-    valid_threshold: float = 0.7
-    lost_threshold: float = 0.5
+    redetection_margin: float = 0.07
+    min_conservative: float = 0.47
     negative_threshold: float = 0.5
     max_positives: int = 200
     max_negatives: int = 300
@@ -58,6 +58,18 @@ class Parameters:
     warp_noise: float = 5.0
     initial_negatives: int = 100
 
+    valid_threshold: float = 0.7
+    lost_threshold: float = 0.5
+    steady_threshold: float = 0.4
+    provisional_threshold: float = 0.55
+    max_residual: float = 0.05
+    confirm_frames: int = 3
+    grace_frames: int = 10
+    widen_frames: int = 8
+
+    align_step: float = 0.06
+    align_gain: float = 0.3
+    align_similarity: float = 0.8
     takeover_overlap: float = 0.5
     fusion_overlap: float = 0.7
     fusion_weight: float = 10.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tracking-Learning-Detection: tracker and detector fused into one state of the object (thesis section 3.1)."""
+"""Tracking-Learning-Detection: the state of one object (thesis section 3.1)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import numpy as np
 
 from tld_follower.box import Box
 from tld_follower.tld import keypoints, median_flow
-from tld_follower.tld.detector import Cluster, Detections, Detector, overlaps
+from tld_follower.tld.alignment import align, blend
+from tld_follower.tld.detector import Detections, Detector, overlaps
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.learning import Learner
+from tld_follower.tld.median_flow import Flow
 from tld_follower.tld.parameters import Parameters
-from tld_follower.tld.object_model import best_products as _bp
 from tld_follower.tld.redetection import SiftMemory
+from tld_follower.tld.trust import Trust
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,9 @@ class Result:
     source: str
 
 
+LEARNING_INSIDE = 0.9
+# A target that moves by less than this share of its side in a frame needs no second guess.
+FAST = 0.1
 LOST = Result(None, 0.0, False, False, "none")
 
 
@@ -54,7 +59,6 @@ class Tracker:
         self._parameters = parameters or Parameters()
         self._seed = seed
         self._frame: Frame | None = None
-        self._result = LOST
         self.learning = self._parameters.learning
 
     @property
@@ -99,11 +103,10 @@ class Tracker:
             self._memory = SiftMemory(self._sift, parameters.sift_views)
             self._memory.learn(frame, inside)
         self._frame = frame
-        self._last_box = self._box = inside
-        self._coherent = 9
-        self._doubt = False
-        self._missed = 0
-        self._result = Result(inside, 1.0, True, True, "tracker")
+        self._box: Box | None = inside
+        self._last_box = inside
+        self._velocity = (0.0, 0.0)
+        self._trust = Trust(parameters)
 
     def update(self, image: np.ndarray) -> Result:
         """Find the target in the next frame.
@@ -123,132 +126,125 @@ class Tracker:
                 f"the image is {frame.width}x{frame.height}, the target was chosen in "
                 f"{self._frame.width}x{self._frame.height}"
             )
-        tracked = self._track(frame)
-        detections = self._detector.detect(frame, self._last_box, self._reach())
-        self._result = self._fuse(frame, tracked, detections)
-        box = self._result.box
-        if box is None:
-            self._missed += 1
+        flow = self._track(frame)
+        reach = min(
+            self._parameters.tracking_scales + self._trust.missed // self._parameters.widen_frames,
+            self._parameters.scales,
+        )
+        detections = self._detector.detect(frame, self._last_box, reach)
+        result = self._redetect(frame, detections) if flow is None else self._fuse(frame, flow, detections)
+        if result.box is None:
+            self._trust.missed += 1
         else:
-            self._missed = 0
-            self._last_box = self._box = box
-            if self._result.valid and self.learning:
-                self._learn(frame, self._result, detections)
+            self._trust.missed = 0
+            self._last_box = result.box
+            if self.learning and self._trust.learnable:
+                self._learn(frame, result.box, detections)
         self._frame = frame
-        return self._result
+        return result
 
-    def _reach(self) -> int:
-        """Size steps about the last box to search: few while it is tracked, more the longer it is lost."""
-        import os
-        parameters = self._parameters
-        wider = self._missed // int(os.environ.get("WIDEN", 8))
-        return min(parameters.tracking_scales + wider, parameters.scales)
+    def _track(self, frame: Frame) -> Flow | None:
+        """Follow the box by median flow; where that fails, once more from the speed that it had."""
+        box, previous = self._box, self._frame
+        if box is None:
+            return None
+        side = self._parameters.grid_points
+        if self._parameters.tracker == "tld_sift":
+            points = self._sift.flow_points(previous, box, side)
+        else:
+            points = keypoints.grid(box, side)
+        flow = median_flow.track(previous, frame, box, points, self._parameters)
+        fast = np.hypot(*self._velocity) > FAST * np.sqrt(box.area)
+        if fast and (flow is None or flow.residual > self._parameters.max_residual):
+            second = median_flow.track(previous, frame, box, points, self._parameters, self._velocity)
+            if flow is None or (second is not None and second.residual < flow.residual):
+                flow = second
+        if flow is None or flow.box.inside_fraction(frame.width, frame.height) <= 0.0:
+            return None
+        self._velocity = (flow.box.center[0] - box.center[0], flow.box.center[1] - box.center[1])
+        return flow
+
+    def _fuse(self, frame: Frame, flow: Flow, detections: Detections) -> Result:
+        """Decide on the state of the object while there is a tracked box (thesis section 3.1.4)."""
+        parameters, trust = self._parameters, self._trust
+        box = self._refine(frame, flow, detections)
+        relative, conservative = self._similarity(frame, box)
+        sure = max(relative, self._detector.nn_threshold)
+        rivals = [
+            cluster
+            for cluster in self._detector.clusters(detections)
+            if cluster.confidence > sure and cluster.box.overlap(flow.box) < parameters.takeover_overlap
+        ]
+        if len(rivals) == 1:
+            return self._take(rivals[0].box, rivals[0].confidence)
+        weak = trust.provisional
+        if trust.observe(flow.residual, relative, conservative, self._detector.nn_threshold):
+            self._box = box
+            return Result(box, relative, True, trust.valid, "tracker")
+        if weak or trust.missed >= parameters.grace_frames:
+            self._drop()
+        else:
+            self._box = box
+        return LOST
+
+    def _redetect(self, frame: Frame, detections: Detections) -> Result:
+        """Look for the target without a tracked box: exactly one cluster of detections takes over."""
+        self._drop()
+        clusters = self._detector.clusters(detections)
+        if len(clusters) == 1:
+            if clusters[0].confidence > self._detector.nn_threshold:
+                return self._take(clusters[0].box, clusters[0].confidence)
+            self._box = clusters[0].box
+            self._trust.restart(provisional=True)
+        elif not clusters and self._parameters.tracker == "tld_sift":
+            proposal = self._memory.propose(frame, self._last_box)
+            if proposal is not None:
+                box, _ = align(frame, self._detector.model, proposal, self._parameters.align_step)
+                relative, conservative = self._similarity(frame, box)
+                if (
+                    relative > self._detector.nn_threshold - self._parameters.redetection_margin
+                    and conservative > self._parameters.min_conservative
+                ):
+                    return self._take(box, relative)
+        return LOST
+
+    def _take(self, box: Box, confidence: float) -> Result:
+        """Go on from a box that the detector found."""
+        self._box = box
+        self._velocity = (0.0, 0.0)
+        self._trust.restart(provisional=False)
+        return Result(box, confidence, True, False, "detector")
+
+    def _drop(self) -> None:
+        self._box = None
+        self._velocity = (0.0, 0.0)
+        self._trust.drop()
 
     def _similarity(self, frame: Frame, box: Box) -> tuple[float, float]:
         """Relative and conservative similarity of a box."""
         similarity = self._detector.model.similarity(frame.patches(np.array([box.as_tuple()])))
         return float(similarity.relative[0]), float(similarity.conservative[0])
 
-    def _track(self, frame: Frame) -> Box | None:
-        box = self._box
-        self._residual = 9.0
-        if box is None:
-            return None
-        side = self._parameters.grid_points
-        if self._parameters.tracker == "tld_sift":
-            points = self._sift.flow_points(self._frame, box, side)
-        else:
-            points = keypoints.grid(box, side)
-        flow = median_flow.track(self._frame, frame, box, points, self._parameters)
-        if flow is None or flow.box.inside_fraction(frame.width, frame.height) <= 0.0:
-            return None
-        self._residual = flow.residual
-        return flow.box
+    def _refine(self, frame: Frame, flow: Flow, detections: Detections) -> Box:
+        """Correct the tracked box by the detections that agree with it, then by the model itself.
 
-    def _fuse(self, frame: Frame, tracked: Box | None, detections: Detections) -> Result:
-        """Decide on the state of the object (thesis section 3.1.4; Kalal 2012)."""
-        import os
-        CON = float(os.environ.get("CON", 0.45)); GRACE = int(os.environ.get("GRACE", 10)); LOSTT = float(os.environ.get("LOSTT", 0.5))
-        LOSTC = float(os.environ.get("LOSTC", 0.0))
+        The box weighs `fusion_weight`, each detection 1 (Kalal 2012). The model's correction is the smaller
+        the better the flow held together: then the tracker is the more precise of the two.
+        """
         parameters = self._parameters
-        clusters = [c for c in self._detector.clusters(detections) if c.conservative > CON]
-        if tracked is None:
-            self._box = None
-            return self._redetect(frame, clusters)
-        box = self._refine(tracked, detections)
-        box = self._align(frame, box, detections)
-        relative, conservative = self._similarity(frame, box)
-        rivals = [
-            c
-            for c in clusters
-            if c.box.overlap(tracked) < parameters.takeover_overlap and c.confidence > relative
-        ]
-        if len(rivals) == 1:
-            self._doubt=True; self._coherent=0
-            return Result(rivals[0].box, rivals[0].confidence, True, False, "detector")
-        MCONF = int(os.environ.get("MCONF", 3)); LOSTU=float(os.environ.get("LOSTU", 0.4))
-        if self._residual > float(os.environ.get("RESID", 0.05)): self._doubt = True
-        if relative < (LOSTT if self._doubt else LOSTU) or conservative < LOSTC:
-            self._box = box if self._missed < GRACE else None
-            return Result(None, 0.0, False, self._result.valid and self._missed < GRACE, "none")
-        if self._residual < float(os.environ.get("RESID", 0.05)) and relative >= LOSTT: self._coherent += 1
-        else: self._coherent = 0
-        if self._coherent > MCONF and relative >= 0.5: self._doubt = False
-        valid = self._result.valid or conservative > parameters.valid_threshold
-        return Result(box, relative, True, valid, "tracker")
-
-    def _redetect(self, frame: Frame, clusters: list[Cluster]) -> Result:
-        if len(clusters) == 1:
-            return Result(clusters[0].box, clusters[0].confidence, True, False, "detector")
-        if self._parameters.tracker == "tld_sift" and not clusters:
-            proposal = self._memory.propose(frame, self._last_box)
-            if proposal is not None:
-                relative, _ = self._similarity(frame, proposal)
-                if relative > self._detector.nn_threshold:
-                    return Result(proposal, relative, True, False, "detector")
-        return LOST
-
-    def _refine(self, tracked: Box, detections: Detections) -> Box:
-        """Average the tracked box, weighing `fusion_weight`, with the detections that agree with it."""
-        near = overlaps(detections.boxes, np.array(tracked.as_tuple())) > self._parameters.fusion_overlap
+        tracked = np.array(flow.box.as_tuple())
+        near = overlaps(detections.boxes, tracked) > parameters.fusion_overlap
         near &= detections.similarity.relative > self._detector.nn_threshold
-        weight = self._parameters.fusion_weight
-        total = weight * np.array(tracked.as_tuple()) + detections.boxes[near].sum(axis=0)
-        return Box(*map(float, total / (weight + np.count_nonzero(near))))
+        total = parameters.fusion_weight * tracked + detections.boxes[near].sum(axis=0)
+        box = Box(*map(float, total / (parameters.fusion_weight + np.count_nonzero(near))))
+        aligned, similarity = align(frame, self._detector.model, box, parameters.align_step)
+        if similarity < parameters.align_similarity:
+            return box
+        return blend(box, aligned, parameters.align_gain * min(1.0, flow.residual / parameters.max_residual))
 
-    def _align(self, frame: Frame, box: Box, detections: Detections) -> Box:
-        import os
-        step = float(os.environ.get("ASTEP", 0.06)); gain = float(os.environ.get("AGAIN", 0.3)); mode = os.environ.get("AMODE", "conservative")
-        rounds = int(os.environ.get("AROUNDS", 2)); minsim = float(os.environ.get("AMIN", 0.8))
-        if gain <= 0: return box
-        center = np.array(box.as_tuple())
-        best = center
-        offs = np.array([(x, y, s) for s in (-1, 0, 1) for y in (-1, 0, 1) for x in (-1, 0, 1)], float)
-        for r in range(rounds):
-            h = step * 0.5**r
-            c = best[:2] + best[2:] / 2
-            wh = best[2:] * (1 + h) ** offs[:, 2:3]
-            cc = c + offs[:, :2] * h * best[2:]
-            boxes = np.concatenate([cc - wh / 2, wh], axis=1)
-            m = self._detector.model
-            if mode == "first":
-                v = 0.5 + 0.5 * _bp(frame.patches(boxes), m.positives.patches[: (len(m.positives) + 1) // 2])
-            else:
-                v = m.similarity(frame.patches(boxes)).positive
-            k = int(np.argmax(v))
-            if v[k] > v[13] + 1e-6:
-                best = boxes[k]
-        if v[k] < minsim: return box
-        out = center + gain * (best - center)
-        return Box(*map(float, out))
-
-    def _learn(self, frame: Frame, result: Result, detections: Detections) -> None:
-        """Train on a valid frame, unless the view has changed too fast or shows too little."""
-        import os
-        LEARN = float(os.environ.get("LEARN", 0.5))
-        box = result.box
-        if self._coherent < int(os.environ.get("MCOH", 1)): return
-        if box.inside_fraction(frame.width, frame.height) < 0.9 or result.confidence < LEARN:
+    def _learn(self, frame: Frame, box: Box, detections: Detections) -> None:
+        """Train on a trusted frame, unless it shows too little of the target."""
+        if box.inside_fraction(frame.width, frame.height) < LEARNING_INSIDE:
             return
         if frame.variance(np.array(box.as_tuple())) < self._detector.min_variance:
             return

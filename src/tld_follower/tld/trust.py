@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the trajectory is worth: when a tracked box may be shown, and when it may be learnt from."""
+
+from __future__ import annotations
+
+from tld_follower.tld.parameters import Parameters
+
+
+class Trust:
+    """The evidence for the box that is followed.
+
+    The target's look and the motion of its points are two witnesses. A trajectory whose points always moved
+    together is the target even where its look is new; once they did not, at an occlusion, the look must do.
+
+    Attributes
+    ----------
+    valid : the trajectory has been confirmed by the model (Kalal 2012); only then may it be learnt from.
+    missed : frames since a box was last shown.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self.valid = True
+        self.missed = 0
+        self._doubtful = False
+        self._provisional = False
+        self._steady = parameters.confirm_frames
+
+    @property
+    def learnable(self) -> bool:
+        """True if the frame seen last may teach the detector."""
+        return self.valid and self._steady > 0
+
+    def restart(self, provisional: bool) -> None:
+        """Begin a new trajectory where the detector found the target.
+
+        Parameters
+        ----------
+        provisional : the evidence was weak; the next frame must confirm it before a box is shown.
+        """
+        self.valid = False
+        self._doubtful = True
+        self._provisional = provisional
+        self._steady = 0
+
+    def drop(self) -> None:
+        """End the trajectory."""
+        self.valid = False
+        self._provisional = False
+        self._steady = 0
+
+    def observe(self, residual: float, relative: float, conservative: float, accepted: float) -> bool:
+        """Take in one tracked frame.
+
+        Parameters
+        ----------
+        residual : of the flow, see `median_flow.Flow`.
+        relative, conservative : similarities of the tracked box, 0..1.
+        accepted : relative similarity at which the detector is sure.
+
+        Returns
+        -------
+        True if the box may be shown.
+        """
+        parameters = self._parameters
+        steady = residual <= parameters.max_residual
+        self._doubtful = self._doubtful or not steady
+        if self._provisional:
+            needed = parameters.provisional_threshold
+        elif self._doubtful or not self.valid:
+            needed = parameters.lost_threshold
+        else:
+            needed = parameters.steady_threshold
+        if relative < needed:
+            self._steady = 0
+            return False
+        self._provisional = False
+        self._steady = self._steady + 1 if steady and relative >= parameters.lost_threshold else 0
+        if self._steady > parameters.confirm_frames and (self.valid or relative > accepted):
+            self._doubtful = False
+        self.valid = self.valid or conservative > parameters.valid_threshold
+        return True
+
+    @property
+    def provisional(self) -> bool:
+        """True until the first frame after a weak detection has confirmed it."""
+        return self._provisional
