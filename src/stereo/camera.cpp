@@ -8,32 +8,32 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 namespace {
 
 // Calibration tools print 6 or more digits; what differs by less is the same number.
-bool close(double a, double b) { return std::abs(a - b) <= 1e-6 * std::max(1.0, std::abs(a)); }
+bool Close(double a, double b) { return std::abs(a - b) <= 1e-6 * std::max(1.0, std::abs(a)); }
 
-bool isCalibrated(const Calibration& camera) {
+bool IsCalibrated(const Calibration& camera) {
   return std::isfinite(camera.p(0, 0)) && camera.p(0, 0) > 0 && std::isfinite(camera.p(1, 1)) &&
          camera.p(1, 1) > 0;
 }
 
-bool isFinite(const Calibration& camera) {
+bool IsFinite(const Calibration& camera) {
   return cv::checkRange(camera.k) && cv::checkRange(camera.r) && cv::checkRange(camera.p) &&
          cv::checkRange(camera.d);
 }
 
-void makeMaps(const Calibration& camera, cv::Mat& map_xy, cv::Mat& map_fraction) {
+void MakeMaps(const Calibration& camera, cv::Mat* map_xy, cv::Mat* map_fraction) {
   const cv::Matx33d p = camera.p.get_minor<3, 3>(0, 0);
   const size_t n = camera.d.size();
   if (camera.distortion_model == "equidistant" && n == 4) {
     cv::fisheye::initUndistortRectifyMap(camera.k, camera.d, camera.r, p, camera.size, CV_16SC2,
-                                         map_xy, map_fraction);
+                                         *map_xy, *map_fraction);
   } else if (n == 0 || (camera.distortion_model == "plumb_bob" && (n == 4 || n == 5)) ||
              (camera.distortion_model == "rational_polynomial" && (n == 8 || n == 12 || n == 14))) {
-    cv::initUndistortRectifyMap(camera.k, camera.d, camera.r, p, camera.size, CV_16SC2, map_xy,
-                                map_fraction);
+    cv::initUndistortRectifyMap(camera.k, camera.d, camera.r, p, camera.size, CV_16SC2, *map_xy,
+                                *map_fraction);
   } else {
     std::ostringstream text;
     text
@@ -51,25 +51,25 @@ bool Calibration::operator==(const Calibration& other) const {
          k == other.k && r == other.r && p == other.p;
 }
 
-bool Calibration::isRectified() const {
+bool Calibration::IsRectified() const {
   if (std::any_of(d.begin(), d.end(), [](double c) { return c != 0; })) return false;
   for (int row = 0; row < 3; ++row) {
     for (int col = 0; col < 3; ++col) {
-      if (!close(r(row, col), row == col ? 1 : 0) || !close(k(row, col), p(row, col))) return false;
+      if (!Close(r(row, col), row == col ? 1 : 0) || !Close(k(row, col), p(row, col))) return false;
     }
   }
   return true;
 }
 
-StereoGeometry StereoGeometry::from(const Calibration& left, const Calibration& right) {
+StereoGeometry StereoGeometry::From(const Calibration& left, const Calibration& right) {
   for (const auto* camera : {&left, &right}) {
-    if (!isCalibrated(*camera)) {
+    if (!IsCalibrated(*camera)) {
       throw std::invalid_argument(std::string(camera == &left ? "left" : "right") +
                                   " camera_info is uncalibrated: P holds no focal length");
     }
   }
-  if (!close(left.p(0, 0), right.p(0, 0)) || !close(left.p(1, 1), right.p(1, 1)) ||
-      !close(left.p(1, 2), right.p(1, 2))) {
+  if (!Close(left.p(0, 0), right.p(0, 0)) || !Close(left.p(1, 1), right.p(1, 1)) ||
+      !Close(left.p(1, 2), right.p(1, 2))) {
     throw std::invalid_argument(
         "left and right camera_info are not of one stereo calibration: P differs in fx, fy or cy");
   }
@@ -88,19 +88,19 @@ StereoGeometry StereoGeometry::from(const Calibration& left, const Calibration& 
   return geometry;
 }
 
-cv::Mat Rectifier::rectify(const cv::Mat& raw, const Calibration& calibration) {
+cv::Mat Rectifier::Rectify(const cv::Mat& raw, const Calibration& calibration) {
   if (raw.size() != calibration.size) {
     std::ostringstream text;
     text << "camera_info is of an image of " << calibration.size << " pixels, the image has "
          << raw.size();
     throw std::invalid_argument(text.str());
   }
-  if (!isFinite(calibration)) throw std::invalid_argument("camera_info holds NaN or infinity");
+  if (!IsFinite(calibration)) throw std::invalid_argument("camera_info holds NaN or infinity");
   if (calibration != calibration_) {
-    calibration_ = {};  // stays unset should the maps fail
+    calibration_ = {};  // Stays unset should the maps fail.
     map_xy_.release();
     map_fraction_.release();
-    if (!calibration.isRectified()) makeMaps(calibration, map_xy_, map_fraction_);
+    if (!calibration.IsRectified()) MakeMaps(calibration, &map_xy_, &map_fraction_);
     calibration_ = calibration;
   }
   if (map_xy_.empty()) return raw;
@@ -108,4 +108,4 @@ cv::Mat Rectifier::rectify(const cv::Mat& raw, const Calibration& calibration) {
   return rectified_;
 }
 
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo

@@ -11,18 +11,18 @@
 
 #include "stereo/matcher.h"
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 namespace {
 
 using Point = pcl::PointXYZRGB;
 
 // Packs the colour of pixel u as PCL wants it in `rgb`: blue in the lowest byte.
 struct Grey {
-  static uint32_t pack(const uchar* row, int u) { return row[u] * 0x010101u; }
+  static uint32_t Pack(const uchar* row, int u) { return row[u] * 0x010101u; }
 };
 template <int kRed, int kBlue>
 struct Colour {
-  static uint32_t pack(const uchar* row, int u) {
+  static uint32_t Pack(const uchar* row, int u) {
     const uchar* pixel = row + 3 * u;
     return static_cast<uint32_t>(pixel[kRed]) << 16 | static_cast<uint32_t>(pixel[1]) << 8 |
            pixel[kBlue];
@@ -31,7 +31,7 @@ struct Colour {
 
 // depth[i] is z of the disparity lowest + i; NaN comes through every product, so nothing branches.
 template <typename Packing>
-void fill(const cv::Mat& disparity, int lowest, const float* depth, const float* slopes, double cy,
+void Fill(const cv::Mat& disparity, int lowest, const float* depth, const float* slopes, double cy,
           double fy, const cv::Mat& texture, uint8_t* out) {
   for (int v = 0; v < disparity.rows; ++v) {
     const auto* fixed = disparity.ptr<int16_t>(v);
@@ -40,36 +40,36 @@ void fill(const cv::Mat& disparity, int lowest, const float* depth, const float*
     for (int u = 0; u < disparity.cols; ++u, out += sizeof(Point)) {
       const float z = depth[fixed[u] - lowest];
       const float xyz[4] = {slopes[u] * z, slope * z, z, 1.0f};
-      const uint32_t rgb[4] = {Packing::pack(colour, u), 0, 0, 0};
+      const uint32_t rgb[4] = {Packing::Pack(colour, u), 0, 0, 0};
       std::memcpy(out, xyz, sizeof xyz);
       std::memcpy(out + sizeof xyz, rgb, sizeof rgb);
     }
   }
 }
 
-void layOut(const cv::Size& size, pcl::PCLPointCloud2& cloud) {
-  if (cloud.fields.empty()) {
+void LayOut(const cv::Size& size, pcl::PCLPointCloud2* cloud) {
+  if (cloud->fields.empty()) {
     pcl::for_each_type<pcl::traits::fieldList<Point>::type>(
-        pcl::detail::FieldAdder<Point>(cloud.fields));
+        pcl::detail::FieldAdder<Point>(cloud->fields));
   }
-  cloud.height = size.height;
-  cloud.width = size.width;
-  cloud.is_bigendian = false;
-  cloud.is_dense = false;
-  cloud.point_step = sizeof(Point);
-  cloud.row_step = cloud.point_step * cloud.width;
-  cloud.data.resize(static_cast<size_t>(cloud.row_step) * cloud.height);
+  cloud->height = size.height;
+  cloud->width = size.width;
+  cloud->is_bigendian = false;
+  cloud->is_dense = false;
+  cloud->point_step = sizeof(Point);
+  cloud->row_step = cloud->point_step * cloud->width;
+  cloud->data.resize(static_cast<size_t>(cloud->row_step) * cloud->height);
 }
 
 }  // namespace
 
-void CloudMaker::make(const cv::Mat& disparity, int min_disparity, const Texture& texture,
-                      const StereoGeometry& geometry, pcl::PCLPointCloud2& cloud) {
+void CloudMaker::Make(const cv::Mat& disparity, int min_disparity, const Texture& texture,
+                      const StereoGeometry& geometry, pcl::PCLPointCloud2* cloud) {
   if (disparity.type() != CV_16SC1 || texture.pixels.size() != disparity.size() ||
       (texture.pixels.type() != CV_8UC1 && texture.pixels.type() != CV_8UC3)) {
     throw std::invalid_argument("a cloud needs disparity (CV_16SC1) and 8-bit colour of one size");
   }
-  layOut(disparity.size(), cloud);
+  LayOut(disparity.size(), cloud);
   if (disparity.empty()) return;
 
   // A fixed-point disparity has few values: each depth is divided out once, in double precision.
@@ -89,11 +89,11 @@ void CloudMaker::make(const cv::Mat& disparity, int min_disparity, const Texture
     slopes_[u] = static_cast<float>((u - geometry.cx) / geometry.fx);
   }
 
-  const auto fill_as = texture.pixels.channels() == 1 ? &fill<Grey>
-                       : texture.red_first            ? &fill<Colour<0, 2>>
-                                                      : &fill<Colour<2, 0>>;
+  const auto fill_as = texture.pixels.channels() == 1 ? &Fill<Grey>
+                       : texture.red_first            ? &Fill<Colour<0, 2>>
+                                                      : &Fill<Colour<2, 0>>;
   fill_as(disparity, lowest, depth_.data(), slopes_.data(), geometry.cy, geometry.fy,
-          texture.pixels, cloud.data.data());
+          texture.pixels, cloud->data.data());
 }
 
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo

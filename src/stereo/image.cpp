@@ -5,14 +5,14 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 namespace {
 
 // OpenCV names a Bayer pattern by the second row's second and third pixel, ROS by the first row.
 struct EncodingTraits {
   const char* name;
   int channels;
-  int to_grey, to_bgr;  // cv::ColorConversionCodes, -1: nothing to convert
+  int to_grey, to_bgr;  // cv::ColorConversionCodes; -1 if there is nothing to convert.
 };
 constexpr std::array<EncodingTraits, 7> kTraits{{
     {"mono8", 1, -1, -1},
@@ -24,17 +24,17 @@ constexpr std::array<EncodingTraits, 7> kTraits{{
     {"bayer_grbg8", 1, cv::COLOR_BayerGB2GRAY, cv::COLOR_BayerGB2BGR},
 }};
 
-const EncodingTraits& traits(Encoding encoding) { return kTraits[static_cast<size_t>(encoding)]; }
+const EncodingTraits& Traits(Encoding encoding) { return kTraits[static_cast<size_t>(encoding)]; }
 
-cv::Mat convert(const cv::Mat& raw, int code, cv::Mat& buffer) {
+cv::Mat Convert(const cv::Mat& raw, int code, cv::Mat* buffer) {
   if (code < 0) return raw;
-  cv::cvtColor(raw, buffer, code);
-  return buffer;
+  cv::cvtColor(raw, *buffer, code);
+  return *buffer;
 }
 
 }  // namespace
 
-Encoding parseEncoding(const std::string& name) {
+Encoding ParseEncoding(const std::string& name) {
   for (size_t i = 0; i < kTraits.size(); ++i) {
     if (name == kTraits[i].name) return static_cast<Encoding>(i);
   }
@@ -42,14 +42,14 @@ Encoding parseEncoding(const std::string& name) {
                               "' is not one of mono8, bgr8, rgb8, bayer_{rggb,bggr,gbrg,grbg}8");
 }
 
-int channels(Encoding encoding) { return traits(encoding).channels; }
+int Channels(Encoding encoding) { return Traits(encoding).channels; }
 
-cv::Mat toGrey(const cv::Mat& raw, Encoding encoding, cv::Mat& buffer) {
-  return convert(raw, traits(encoding).to_grey, buffer);
+cv::Mat ToGrey(const cv::Mat& raw, Encoding encoding, cv::Mat* buffer) {
+  return Convert(raw, Traits(encoding).to_grey, buffer);
 }
 
-Texture toTexture(const cv::Mat& raw, Encoding encoding, cv::Mat& buffer) {
-  return {convert(raw, traits(encoding).to_bgr, buffer), encoding == Encoding::kRgb};
+Texture ToTexture(const cv::Mat& raw, Encoding encoding, cv::Mat* buffer) {
+  return {Convert(raw, Traits(encoding).to_bgr, buffer), encoding == Encoding::kRgb};
 }
 
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo

@@ -5,19 +5,19 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 
 enum class Encoding { kMono, kBgr, kRgb, kBayerRggb, kBayerBggr, kBayerGbrg, kBayerGrbg };
 
-/// Reads a ROS encoding: mono8, bgr8, rgb8 or bayer_{rggb,bggr,gbrg,grbg}8.
-/// @throws std::invalid_argument for any other.
-Encoding parseEncoding(const std::string& name);
+/// Reads a ROS encoding: mono8, bgr8, rgb8 or bayer_{rggb,bggr,gbrg,grbg}8. Throws
+/// std::invalid_argument for any other.
+Encoding ParseEncoding(const std::string& name);
 
 /// Bytes of one raw pixel.
-int channels(Encoding encoding);
+int Channels(Encoding encoding);
 
 /// Grey image (CV_8UC1) of a raw one. Shares its pixels if it is grey; else `buffer` holds them.
-cv::Mat toGrey(const cv::Mat& raw, Encoding encoding, cv::Mat& buffer);
+cv::Mat ToGrey(const cv::Mat& raw, Encoding encoding, cv::Mat* buffer);
 
 /// Colour of every pixel: CV_8UC1 (grey) or CV_8UC3, blue first unless `red_first`.
 struct Texture {
@@ -26,6 +26,6 @@ struct Texture {
 };
 
 /// Colours of a raw image. Shares its pixels unless a Bayer pattern must be unfolded into `buffer`.
-Texture toTexture(const cv::Mat& raw, Encoding encoding, cv::Mat& buffer);
+Texture ToTexture(const cv::Mat& raw, Encoding encoding, cv::Mat* buffer);
 
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo

@@ -5,11 +5,11 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 
-Matcher::Matcher(const MatcherParameters& parameters) { setParameters(parameters); }
+Matcher::Matcher(const MatcherParameters& parameters) { SetParameters(parameters); }
 
-void Matcher::setParameters(const MatcherParameters& parameters) {
+void Matcher::SetParameters(const MatcherParameters& parameters) {
   MatcherParameters p = parameters;
   p.correlation_window_size |= 1;
   p.disparity_range -= p.disparity_range % 16;
@@ -35,7 +35,7 @@ void Matcher::setParameters(const MatcherParameters& parameters) {
   parameters_ = p;
 }
 
-const cv::Mat& Matcher::match(const cv::Mat& left, const cv::Mat& right) {
+const cv::Mat& Matcher::Match(const cv::Mat& left, const cv::Mat& right) {
   if (left.empty() || right.empty()) throw std::invalid_argument("an image of the pair is empty");
   if (left.type() != CV_8UC1 || right.type() != CV_8UC1) {
     throw std::invalid_argument("images to match must be grey, 8 bit");
@@ -55,7 +55,7 @@ const cv::Mat& Matcher::match(const cv::Mat& left, const cv::Mat& right) {
   return disparity_;
 }
 
-cv::Rect Matcher::validWindow(cv::Size image) const {
+cv::Rect Matcher::ValidWindow(cv::Size image) const {
   const int border = parameters_.correlation_window_size / 2;
   const int max_disparity = parameters_.min_disparity + parameters_.disparity_range - 1;
   const cv::Point first(border + std::max(0, max_disparity), border);
@@ -64,8 +64,8 @@ cv::Rect Matcher::validWindow(cv::Size image) const {
   return first.x < end.x && first.y < end.y ? cv::Rect(first, end) : cv::Rect();
 }
 
-void toPixels(const cv::Mat& disparity, double offset, cv::Mat& pixels) {
-  disparity.convertTo(pixels, CV_32F, 1.0 / kSteps, -offset);
+void ToPixels(const cv::Mat& disparity, double offset, cv::Mat* pixels) {
+  disparity.convertTo(*pixels, CV_32F, 1.0 / kSteps, -offset);
 }
 
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "stereo/stereo_node.h"
 
+#include <malloc.h>
 #include <pcl_conversions/pcl_conversions.h>
 #include <ros/master.h>
 #include <sensor_msgs/image_encodings.h>
@@ -8,31 +9,32 @@
 #include <algorithm>
 #include <boost/bind/bind.hpp>
 #include <exception>
+#include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 namespace {
 
 using sensor_msgs::CameraInfo;
 using sensor_msgs::Image;
-constexpr double kCheckPeriod = 5;  // s, wall time
+constexpr double kCheckPeriod = 5;  // [s of wall-clock time]
 constexpr std::chrono::seconds kSameWarningPeriod{10};
-constexpr uint32_t kNewestOnly = 1;  // a queue of more would only make pairs older under load
+constexpr uint32_t kNewestOnly = 1;  // A queue of more would only make pairs older under load.
 
 // Shares the message's bytes; OpenCV has no constant views, nothing writes to this one.
-cv::Mat toMat(const Image& image, Encoding encoding) {
-  const size_t row = static_cast<size_t>(image.width) * channels(encoding);
+cv::Mat ToMat(const Image& image, Encoding encoding) {
+  const size_t row = static_cast<size_t>(image.width) * Channels(encoding);
   if (row == 0 || image.height == 0) throw std::invalid_argument("the image is empty");
   if (image.step < row || image.data.size() < static_cast<size_t>(image.step) * image.height) {
     throw std::invalid_argument("the image has fewer bytes than its size and encoding ask for");
   }
-  return cv::Mat(image.height, image.width, CV_8UC(channels(encoding)),
+  return cv::Mat(image.height, image.width, CV_8UC(Channels(encoding)),
                  const_cast<uint8_t*>(image.data.data()), image.step);
 }
 
 // The calibration in pixels of the image: full-resolution camera_info, moved to the region of
 // interest and divided by the binning.
-Calibration toCalibration(const CameraInfo& info) {
+Calibration ToCalibration(const CameraInfo& info) {
   const double bin_x = std::max(1u, info.binning_x), bin_y = std::max(1u, info.binning_y);
   const auto& roi = info.roi;
   const cv::Matx33d window(1 / bin_x, 0, -(roi.x_offset / bin_x), 0, 1 / bin_y,
@@ -50,7 +52,7 @@ Calibration toCalibration(const CameraInfo& info) {
   return calibration;
 }
 
-MatcherParameters toParameters(const tld_follower::StereoConfig& config) {
+MatcherParameters ToParameters(const tld_follower::StereoConfig& config) {
   MatcherParameters parameters;
   parameters.algorithm = static_cast<Algorithm>(config.stereo_algorithm);
   parameters.prefilter_cap = config.prefilter_cap;
@@ -68,7 +70,7 @@ MatcherParameters toParameters(const tld_follower::StereoConfig& config) {
   return parameters;
 }
 
-std::string joined(const std::vector<std::string>& names) {
+std::string Joined(const std::vector<std::string>& names) {
   std::string text;
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
@@ -76,31 +78,33 @@ std::string joined(const std::vector<std::string>& names) {
 
 }  // namespace
 
-StereoNode::StereoNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
-    : nh_(nh),
-      transport_(nh),
-      hints_("raw", ros::TransportHints().tcpNoDelay(), private_nh),
-      queue_size_(std::max(1, private_nh.param("queue_size", 5))),
-      approximate_sync_(private_nh.param("approximate_sync", false)),
-      reconfigure_server_(private_nh) {
-  makeSynchroniser();
-  images_[0].registerCallback([this](const ros::MessageEvent<const Image>& m) { add<0>(m); });
-  infos_[0].registerCallback([this](const ros::MessageEvent<const CameraInfo>& m) { add<1>(m); });
-  images_[1].registerCallback([this](const ros::MessageEvent<const Image>& m) { add<2>(m); });
-  infos_[1].registerCallback([this](const ros::MessageEvent<const CameraInfo>& m) { add<3>(m); });
+StereoNode::StereoNode(ros::NodeHandle handle, ros::NodeHandle private_handle)
+    : handle_(handle),
+      transport_(handle),
+      hints_("raw", ros::TransportHints().tcpNoDelay(), private_handle),
+      queue_size_(std::max(1, private_handle.param("queue_size", 5))),
+      approximate_sync_(private_handle.param("approximate_sync", false)),
+      reconfigure_server_(private_handle) {
+  MakeSynchroniser();
+  images_[0].registerCallback([this](const ros::MessageEvent<const Image>& m) { OnMessage<0>(m); });
+  infos_[0].registerCallback(
+      [this](const ros::MessageEvent<const CameraInfo>& m) { OnMessage<1>(m); });
+  images_[1].registerCallback([this](const ros::MessageEvent<const Image>& m) { OnMessage<2>(m); });
+  infos_[1].registerCallback(
+      [this](const ros::MessageEvent<const CameraInfo>& m) { OnMessage<3>(m); });
 
   reconfigure_server_.setCallback(
-      [this](tld_follower::StereoConfig& config, uint32_t) { reconfigure(config); });
-  const auto changed = [this](const ros::SingleSubscriberPublisher&) { subscribeWhileNeeded(); };
+      [this](tld_follower::StereoConfig& config, uint32_t) { OnReconfigure(&config); });
+  const auto changed = [this](const ros::SingleSubscriberPublisher&) { SubscribeWhileNeeded(); };
   disparity_publisher_ =
-      nh_.advertise<stereo_msgs::DisparityImage>("disparity", kNewestOnly, changed, changed);
+      handle_.advertise<stereo_msgs::DisparityImage>("disparity", kNewestOnly, changed, changed);
   cloud_publisher_ =
-      nh_.advertise<sensor_msgs::PointCloud2>("points2", kNewestOnly, changed, changed);
-  input_timer_ = nh_.createWallTimer(ros::WallDuration(kCheckPeriod),
-                                     [this](const ros::WallTimerEvent&) { checkInputs(); });
+      handle_.advertise<sensor_msgs::PointCloud2>("points2", kNewestOnly, changed, changed);
+  input_timer_ = handle_.createWallTimer(ros::WallDuration(kCheckPeriod),
+                                         [this](const ros::WallTimerEvent&) { CheckInputs(); });
 }
 
-void StereoNode::makeSynchroniser() {
+void StereoNode::MakeSynchroniser() {
   using namespace boost::placeholders;
   if (approximate_sync_) {
     synchroniser_ = std::make_unique<Approximate>(static_cast<uint32_t>(queue_size_));
@@ -109,18 +113,18 @@ void StereoNode::makeSynchroniser() {
   }
   std::visit(
       [this](auto& synchroniser) {
-        synchroniser->registerCallback(boost::bind(&StereoNode::receive, this, _1, _2, _3, _4));
+        synchroniser->registerCallback(boost::bind(&StereoNode::OnPair, this, _1, _2, _3, _4));
       },
       synchroniser_);
 }
 
 template <int kInput, typename Message>
-void StereoNode::add(const ros::MessageEvent<const Message>& event) {
+void StereoNode::OnMessage(const ros::MessageEvent<const Message>& event) {
   const ros::Time stamp = event.getConstMessage()->header.stamp;
   // After a jump back in time (a bag that starts over, a reset simulation) messages that wait for
   // their partners would crowd out all new ones.
   if (stamp < newest_[kInput]) {
-    makeSynchroniser();
+    MakeSynchroniser();
     newest_ = {};
   }
   newest_[kInput] = stamp;
@@ -129,7 +133,7 @@ void StereoNode::add(const ros::MessageEvent<const Message>& event) {
              synchroniser_);
 }
 
-void StereoNode::subscribeWhileNeeded() {
+void StereoNode::SubscribeWhileNeeded() {
   const bool needed =
       disparity_publisher_.getNumSubscribers() + cloud_publisher_.getNumSubscribers() > 0;
   if (needed == subscribed_) return;
@@ -137,63 +141,63 @@ void StereoNode::subscribeWhileNeeded() {
   received_ = {};
   pairs_ = 0;
   if (!needed) {
-    makeSynchroniser();  // forgets what waits for a partner
+    MakeSynchroniser();  // Forgets what waits for a partner.
     for (auto& image : images_) image.unsubscribe();
     for (auto& info : infos_) info.unsubscribe();
     return;
   }
   images_[0].subscribe(transport_, "left/image_raw", kNewestOnly, hints_);
-  infos_[0].subscribe(nh_, "left/camera_info", kNewestOnly, hints_.getRosHints());
+  infos_[0].subscribe(handle_, "left/camera_info", kNewestOnly, hints_.getRosHints());
   images_[1].subscribe(transport_, "right/image_raw", kNewestOnly, hints_);
-  infos_[1].subscribe(nh_, "right/camera_info", kNewestOnly, hints_.getRosHints());
-  input_timer_.stop();  // a whole period from now on
+  infos_[1].subscribe(handle_, "right/camera_info", kNewestOnly, hints_.getRosHints());
+  input_timer_.stop();  // A whole period from now on.
   input_timer_.start();
 }
 
-void StereoNode::reconfigure(tld_follower::StereoConfig& config) {
-  matcher_.setParameters(toParameters(config));
+void StereoNode::OnReconfigure(tld_follower::StereoConfig* config) {
+  matcher_.SetParameters(ToParameters(*config));
   // The client is shown what is in force.
-  config.prefilter_size |= 1;
-  config.correlation_window_size = matcher_.parameters().correlation_window_size;
-  config.disparity_range = matcher_.parameters().disparity_range;
+  config->prefilter_size |= 1;
+  config->correlation_window_size = matcher_.parameters().correlation_window_size;
+  config->disparity_range = matcher_.parameters().disparity_range;
 }
 
-void StereoNode::Eye::read(const Image& image, const CameraInfo& info) try {
-  calibration = toCalibration(info);
-  encoding = parseEncoding(image.encoding);
-  raw = toMat(image, encoding);
-  rectified_grey = grey_rectifier_.rectify(toGrey(raw, encoding, grey_), calibration);
+void StereoNode::Eye::Read(const Image& image, const CameraInfo& info) try {
+  calibration = ToCalibration(info);
+  encoding = ParseEncoding(image.encoding);
+  raw = ToMat(image, encoding);
+  rectified_grey = grey_rectifier_.Rectify(ToGrey(raw, encoding, &grey_), calibration);
 } catch (const std::invalid_argument& error) {
   throw std::invalid_argument(name + " camera: " + error.what());
 }
 
-Texture StereoNode::Eye::texture() {
+Texture StereoNode::Eye::RectifiedTexture() {
   if (encoding == Encoding::kMono) return {rectified_grey};
-  Texture texture = toTexture(raw, encoding, texture_);
-  texture.pixels = texture_rectifier_.rectify(texture.pixels, calibration);
+  Texture texture = ToTexture(raw, encoding, &texture_);
+  texture.pixels = texture_rectifier_.Rectify(texture.pixels, calibration);
   return texture;
 }
 
-void StereoNode::receive(const ImagePtr& left_image, const InfoPtr& left_info,
-                         const ImagePtr& right_image, const InfoPtr& right_info) {
+void StereoNode::OnPair(const ImagePtr& left_image, const InfoPtr& left_info,
+                        const ImagePtr& right_image, const InfoPtr& right_info) {
   ++pairs_;
   try {
-    left_.read(*left_image, *left_info);
-    right_.read(*right_image, *right_info);
-    const auto geometry = StereoGeometry::from(left_.calibration, right_.calibration);
-    const cv::Mat& disparity = matcher_.match(left_.rectified_grey, right_.rectified_grey);
+    left_.Read(*left_image, *left_info);
+    right_.Read(*right_image, *right_info);
+    const auto geometry = StereoGeometry::From(left_.calibration, right_.calibration);
+    const cv::Mat& disparity = matcher_.Match(left_.rectified_grey, right_.rectified_grey);
     if (cloud_publisher_.getNumSubscribers() > 0) {
-      publishCloud(disparity, geometry, left_image->header);
+      PublishCloud(disparity, geometry, left_image->header);
     }
     if (disparity_publisher_.getNumSubscribers() > 0) {
-      publishDisparity(disparity, geometry, left_image->header);
+      PublishDisparity(disparity, geometry, left_image->header);
     }
   } catch (const std::exception& error) {
-    warn(std::string("no disparity for this pair: ") + error.what());
+    Warn(std::string("no disparity for this pair: ") + error.what());
   }
 }
 
-void StereoNode::publishDisparity(const cv::Mat& disparity, const StereoGeometry& geometry,
+void StereoNode::PublishDisparity(const cv::Mat& disparity, const StereoGeometry& geometry,
                                   const std_msgs::Header& header) {
   auto& message = disparity_message_;
   message.header = message.image.header = header;
@@ -203,7 +207,7 @@ void StereoNode::publishDisparity(const cv::Mat& disparity, const StereoGeometry
   message.image.step = disparity.cols * sizeof(float);
   message.image.data.resize(static_cast<size_t>(message.image.step) * disparity.rows);
   cv::Mat pixels(disparity.size(), CV_32FC1, message.image.data.data(), message.image.step);
-  toPixels(disparity, geometry.offset, pixels);
+  ToPixels(disparity, geometry.offset, &pixels);
 
   const auto& parameters = matcher_.parameters();
   message.f = static_cast<float>(geometry.fx);
@@ -211,7 +215,7 @@ void StereoNode::publishDisparity(const cv::Mat& disparity, const StereoGeometry
   message.min_disparity = static_cast<float>(parameters.min_disparity - geometry.offset);
   message.max_disparity = message.min_disparity + parameters.disparity_range - 1;
   message.delta_d = 1.0f / kSteps;
-  const cv::Rect window = matcher_.validWindow(disparity.size());
+  const cv::Rect window = matcher_.ValidWindow(disparity.size());
   message.valid_window.x_offset = window.x;
   message.valid_window.y_offset = window.y;
   message.valid_window.width = window.width;
@@ -219,19 +223,19 @@ void StereoNode::publishDisparity(const cv::Mat& disparity, const StereoGeometry
   disparity_publisher_.publish(message);
 }
 
-void StereoNode::publishCloud(const cv::Mat& disparity, const StereoGeometry& geometry,
+void StereoNode::PublishCloud(const cv::Mat& disparity, const StereoGeometry& geometry,
                               const std_msgs::Header& header) {
   // The bytes move from the last message to PCL and back: no copy, no new memory.
   pcl::PCLPointCloud2 cloud;
   pcl_conversions::moveToPCL(cloud_message_, cloud);
-  cloud_maker_.make(disparity, matcher_.parameters().min_disparity, left_.texture(), geometry,
-                    cloud);
+  cloud_maker_.Make(disparity, matcher_.parameters().min_disparity, left_.RectifiedTexture(),
+                    geometry, &cloud);
   pcl_conversions::moveFromPCL(cloud, cloud_message_);
-  cloud_message_.header = header;  // PCL's own stamp has microseconds only
+  cloud_message_.header = header;  // PCL's own stamp has microseconds only.
   cloud_publisher_.publish(cloud_message_);
 }
 
-void StereoNode::checkInputs() {
+void StereoNode::CheckInputs() {
   const ros::Time now = ros::Time::now();
   const bool clock_stands = ros::Time::isSimTime() && !now.isZero() && now == last_check_;
   last_check_ = now;
@@ -252,19 +256,19 @@ void StereoNode::checkInputs() {
     if (received[i] == 0) (publishers[i] == 0 ? unpublished : silent).push_back(topics[i]);
   }
   if (!unpublished.empty()) {
-    warn("no disparity: nobody publishes " + joined(unpublished) +
-         " (are the cameras running, and in the namespace " + nh_.getNamespace() + "?)");
+    Warn("no disparity: nobody publishes " + Joined(unpublished) +
+         " (are the cameras running, and in the namespace " + handle_.getNamespace() + "?)");
   } else if (!silent.empty()) {
-    warn("no disparity: nothing arrives on " + joined(silent) + " (check with: rostopic hz)");
+    Warn("no disparity: nothing arrives on " + Joined(silent) + " (check with: rostopic hz)");
   } else {
-    warn("no disparity: images and camera_info arrive, but none of them pair up; " +
+    Warn("no disparity: images and camera_info arrive, but none of them pair up; " +
          std::string(approximate_sync_
                          ? "their stamps are too far apart for queue_size"
                          : "their stamps must be identical, else set approximate_sync"));
   }
 }
 
-void StereoNode::warn(const std::string& text) {
+void StereoNode::Warn(const std::string& text) {
   const auto now = std::chrono::steady_clock::now();
   if (text == last_warning_ && now - last_warning_time_ < kSameWarningPeriod) return;
   last_warning_ = text;
@@ -272,4 +276,14 @@ void StereoNode::warn(const std::string& text) {
   ROS_WARN_STREAM(text);
 }
 
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "stereo_image_proc");
+  // Clouds come and go at frame rate: keep their pages instead of asking the kernel for new ones.
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_TRIM_THRESHOLD, 128 << 20);
+  cv::setNumThreads(1);  // The machine's other cores belong to the other nodes.
+  tld_follower::stereo::StereoNode node(ros::NodeHandle(), ros::NodeHandle("~"));
+  ros::spin();
+}

@@ -26,15 +26,15 @@
 #include "stereo/image.h"
 #include "stereo/matcher.h"
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 
 /// Turns {left,right}/{image_raw,camera_info} into `disparity` and `points2`: a drop-in for the
 /// node stereo_image_proc. Subscribes only while somebody subscribes to a result, computes only
 /// what is subscribed, and works on the newest pair. All callbacks must come from one thread.
 class StereoNode {
  public:
-  /// Topics are relative to `nh`, parameters private to `private_nh`.
-  StereoNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  /// Topics are relative to `handle`, parameters private to `private_handle`.
+  StereoNode(ros::NodeHandle handle, ros::NodeHandle private_handle);
 
  private:
   using ImagePtr = sensor_msgs::ImageConstPtr;
@@ -52,34 +52,34 @@ class StereoNode {
     std::string name;
     Calibration calibration;
     Encoding encoding = Encoding::kMono;
-    cv::Mat raw;             // shares the message's bytes
-    cv::Mat rectified_grey;  // shares them too where nothing had to be done
+    cv::Mat raw;             // Shares the message's bytes.
+    cv::Mat rectified_grey;  // Shares them too where nothing had to be done.
 
-    /// @throws std::invalid_argument, with the camera's name, for messages that make no picture.
-    void read(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info);
+    /// Throws std::invalid_argument, with the camera's name, for messages that make no picture.
+    void Read(const sensor_msgs::Image& image, const sensor_msgs::CameraInfo& info);
     /// Colours of the rectified image that was read last.
-    Texture texture();
+    Texture RectifiedTexture();
 
    private:
     Rectifier grey_rectifier_, texture_rectifier_;
     cv::Mat grey_, texture_;
   };
 
-  void makeSynchroniser();
+  void MakeSynchroniser();
   template <int kInput, typename Message>
-  void add(const ros::MessageEvent<const Message>& event);
-  void subscribeWhileNeeded();
-  void reconfigure(tld_follower::StereoConfig& config);
-  void receive(const ImagePtr& left_image, const InfoPtr& left_info, const ImagePtr& right_image,
-               const InfoPtr& right_info);
-  void publishDisparity(const cv::Mat& disparity, const StereoGeometry& geometry,
+  void OnMessage(const ros::MessageEvent<const Message>& event);
+  void SubscribeWhileNeeded();
+  void OnReconfigure(tld_follower::StereoConfig* config);
+  void OnPair(const ImagePtr& left_image, const InfoPtr& left_info, const ImagePtr& right_image,
+              const InfoPtr& right_info);
+  void PublishDisparity(const cv::Mat& disparity, const StereoGeometry& geometry,
                         const std_msgs::Header& header);
-  void publishCloud(const cv::Mat& disparity, const StereoGeometry& geometry,
+  void PublishCloud(const cv::Mat& disparity, const StereoGeometry& geometry,
                     const std_msgs::Header& header);
-  void checkInputs();
-  void warn(const std::string& text);
+  void CheckInputs();
+  void Warn(const std::string& text);
 
-  ros::NodeHandle nh_;
+  ros::NodeHandle handle_;
   image_transport::ImageTransport transport_;
   image_transport::TransportHints hints_;
   int queue_size_;
@@ -97,7 +97,7 @@ class StereoNode {
   sensor_msgs::PointCloud2 cloud_message_;
 
   // Of left image, left info, right image, right info: the newest stamp, and how many came in since
-  // checkInputs() looked; pairs_: how many pairs they made.
+  // CheckInputs() looked; pairs_: how many pairs they made.
   std::array<ros::Time, 4> newest_;
   std::array<int, 4> received_{};
   int pairs_ = 0;
@@ -110,4 +110,4 @@ class StereoNode {
   ros::WallTimer input_timer_;
 };
 
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo

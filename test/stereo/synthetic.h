@@ -7,10 +7,10 @@
 
 #include "stereo/camera.h"
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 
 /// Grey noise, smooth enough to be sampled between pixels.
-inline cv::Mat makeTexture(cv::Size size, uint64_t seed) {
+inline cv::Mat MakeTexture(cv::Size size, uint64_t seed) {
   cv::RNG rng(seed);
   cv::Mat noise(size, CV_8UC1);
   rng.fill(noise, cv::RNG::UNIFORM, 0, 256);
@@ -19,8 +19,8 @@ inline cv::Mat makeTexture(cv::Size size, uint64_t seed) {
   return noise;
 }
 
-/// The right image of a left one whose disparity is base + along_x * x + along_y * y, pixels.
-inline cv::Mat makeRight(const cv::Mat& left, double base, double along_x = 0, double along_y = 0) {
+/// The right image of a left one whose disparity is base + along_x * x + along_y * y [pixel].
+inline cv::Mat MakeRight(const cv::Mat& left, double base, double along_x = 0, double along_y = 0) {
   cv::Mat_<cv::Vec2f> map(left.size());
   for (int y = 0; y < left.rows; ++y) {
     for (int x = 0; x < left.cols; ++x) {
@@ -33,8 +33,8 @@ inline cv::Mat makeRight(const cv::Mat& left, double base, double along_x = 0, d
   return right;
 }
 
-/// A rectified camera; `shift` is P[3] = -f * baseline.
-inline Calibration makeCalibration(cv::Size size, double f, double cx, double cy, double shift) {
+/// A rectified camera; `shift` is P[3] = -f * baseline [pixel m].
+inline Calibration MakeCalibration(cv::Size size, double f, double cx, double cy, double shift) {
   Calibration calibration;
   calibration.size = size;
   calibration.distortion_model = "plumb_bob";
@@ -44,4 +44,4 @@ inline Calibration makeCalibration(cv::Size size, double f, double cx, double cy
   return calibration;
 }
 
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo

@@ -6,38 +6,38 @@
 
 #include "stereo/image.h"
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 namespace {
 
 const cv::Vec3b kBgr(40, 120, 220);
 constexpr int kGreyLevel = 141;  // 0.114 * 40 + 0.587 * 120 + 0.299 * 220
 
 TEST(Image, KnowsTheEncodingsOfTheContractOnly) {
-  EXPECT_EQ(channels(parseEncoding("mono8")), 1);
-  EXPECT_EQ(channels(parseEncoding("bgr8")), 3);
-  EXPECT_EQ(channels(parseEncoding("bayer_grbg8")), 1);
+  EXPECT_EQ(Channels(ParseEncoding("mono8")), 1);
+  EXPECT_EQ(Channels(ParseEncoding("bgr8")), 3);
+  EXPECT_EQ(Channels(ParseEncoding("bayer_grbg8")), 1);
   for (const char* name : {"", "mono16", "32FC1", "MONO8", "bayer_rggb16"}) {
-    EXPECT_THROW(parseEncoding(name), std::invalid_argument) << name;
+    EXPECT_THROW(ParseEncoding(name), std::invalid_argument) << name;
   }
 }
 
 TEST(Image, GreyIsSharedAndColourWeighted) {
   cv::Mat buffer;
   const cv::Mat grey(4, 6, CV_8UC1, cv::Scalar(kGreyLevel));
-  EXPECT_EQ(toGrey(grey, Encoding::kMono, buffer).data, grey.data);
+  EXPECT_EQ(ToGrey(grey, Encoding::kMono, &buffer).data, grey.data);
   const cv::Mat bgr(4, 6, CV_8UC3, cv::Scalar(kBgr));
-  EXPECT_EQ(toGrey(bgr, Encoding::kBgr, buffer).at<uchar>(2, 3), kGreyLevel);
+  EXPECT_EQ(ToGrey(bgr, Encoding::kBgr, &buffer).at<uchar>(2, 3), kGreyLevel);
   const cv::Mat rgb(4, 6, CV_8UC3, cv::Scalar(kBgr[2], kBgr[1], kBgr[0]));
-  EXPECT_EQ(toGrey(rgb, Encoding::kRgb, buffer).at<uchar>(2, 3), kGreyLevel);
+  EXPECT_EQ(ToGrey(rgb, Encoding::kRgb, &buffer).at<uchar>(2, 3), kGreyLevel);
 }
 
 TEST(Image, TextureSharesColourAndSaysItsOrder) {
   cv::Mat buffer;
   const cv::Mat pixels(4, 6, CV_8UC3, cv::Scalar(kBgr));
-  const Texture rgb = toTexture(pixels, Encoding::kRgb, buffer);
+  const Texture rgb = ToTexture(pixels, Encoding::kRgb, &buffer);
   EXPECT_EQ(rgb.pixels.data, pixels.data);
   EXPECT_TRUE(rgb.red_first);
-  EXPECT_FALSE(toTexture(pixels, Encoding::kBgr, buffer).red_first);
+  EXPECT_FALSE(ToTexture(pixels, Encoding::kBgr, &buffer).red_first);
 }
 
 TEST(Image, EveryBayerPatternGivesItsColourBack) {
@@ -49,11 +49,11 @@ TEST(Image, EveryBayerPatternGivesItsColourBack) {
         raw.at<uchar>(y, x) = colour == 'b' ? kBgr[0] : colour == 'g' ? kBgr[1] : kBgr[2];
       }
     }
-    const Encoding encoding = parseEncoding("bayer_" + pattern + "8");
-    EXPECT_EQ(toTexture(raw, encoding, buffer).pixels.at<cv::Vec3b>(4, 4), kBgr) << pattern;
-    EXPECT_NEAR(toGrey(raw, encoding, buffer).at<uchar>(4, 4), kGreyLevel, 1) << pattern;
+    const Encoding encoding = ParseEncoding("bayer_" + pattern + "8");
+    EXPECT_EQ(ToTexture(raw, encoding, &buffer).pixels.at<cv::Vec3b>(4, 4), kBgr) << pattern;
+    EXPECT_NEAR(ToGrey(raw, encoding, &buffer).at<uchar>(4, 4), kGreyLevel, 1) << pattern;
   }
 }
 
 }  // namespace
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo

@@ -7,19 +7,19 @@
 #include "stereo/matcher.h"
 #include "synthetic.h"
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 namespace {
 
 const cv::Size kSize(320, 240);
 
 struct Agreement {
-  double matched = 0;     // share of the pixels with a disparity
-  double right = 0;       // share of these within half a pixel of the truth
-  double mean_error = 0;  // of these, pixels
+  double matched = 0;     // Share of the pixels with a disparity.
+  double right = 0;       // Share of these within half a pixel of the truth.
+  double mean_error = 0;  // Of these [pixel].
 };
 
 template <typename Truth>
-Agreement compare(const cv::Mat& disparity, int invalid, const cv::Rect& window, Truth truth) {
+Agreement Compare(const cv::Mat& disparity, int invalid, const cv::Rect& window, Truth truth) {
   int matched = 0, right = 0;
   double sum = 0;
   for (int y = window.y; y < window.br().y; ++y) {
@@ -38,7 +38,7 @@ Agreement compare(const cv::Mat& disparity, int invalid, const cv::Rect& window,
 
 class EveryAlgorithm : public testing::TestWithParam<Algorithm> {
  protected:
-  MatcherParameters parameters() const {
+  MatcherParameters Parameters() const {
     MatcherParameters parameters;
     parameters.algorithm = GetParam();
     return parameters;
@@ -48,11 +48,11 @@ INSTANTIATE_TEST_SUITE_P(Matcher, EveryAlgorithm,
                          testing::Values(Algorithm::kBlockMatching, Algorithm::kSemiGlobal));
 
 TEST_P(EveryAlgorithm, FindsAShiftOverTheWholeSearchMinimumIncluded) {
-  const cv::Mat left = makeTexture(kSize, 1);
-  Matcher matcher(parameters());
+  const cv::Mat left = MakeTexture(kSize, 1);
+  Matcher matcher(Parameters());
   for (int shift : {0, 1, 12, 40, 62}) {
-    const cv::Mat& disparity = matcher.match(left, makeRight(left, shift));
-    const auto result = compare(disparity, matcher.invalid(), matcher.validWindow(kSize),
+    const cv::Mat& disparity = matcher.Match(left, MakeRight(left, shift));
+    const auto result = Compare(disparity, matcher.Invalid(), matcher.ValidWindow(kSize),
                                 [&](int, int) { return shift; });
     EXPECT_GT(result.matched, 0.99) << shift;
     EXPECT_GT(result.right, 0.99) << shift;
@@ -61,11 +61,11 @@ TEST_P(EveryAlgorithm, FindsAShiftOverTheWholeSearchMinimumIncluded) {
 }
 
 TEST_P(EveryAlgorithm, FindsASlantedPlaneBetweenPixels) {
-  const cv::Mat left = makeTexture(kSize, 2);
+  const cv::Mat left = MakeTexture(kSize, 2);
   const double base = 10.3, along_x = 0.05, along_y = 0.04;
-  Matcher matcher(parameters());
-  const cv::Mat& disparity = matcher.match(left, makeRight(left, base, along_x, along_y));
-  const auto result = compare(disparity, matcher.invalid(), matcher.validWindow(kSize),
+  Matcher matcher(Parameters());
+  const cv::Mat& disparity = matcher.Match(left, MakeRight(left, base, along_x, along_y));
+  const auto result = Compare(disparity, matcher.Invalid(), matcher.ValidWindow(kSize),
                               [&](int x, int y) { return base + along_x * x + along_y * y; });
   EXPECT_GT(result.matched, 0.95);
   EXPECT_GT(result.right, 0.97);
@@ -73,15 +73,15 @@ TEST_P(EveryAlgorithm, FindsASlantedPlaneBetweenPixels) {
 }
 
 TEST_P(EveryAlgorithm, SearchesFromAnyMinimum) {
-  const cv::Mat left = makeTexture(kSize, 3);
+  const cv::Mat left = MakeTexture(kSize, 3);
   for (int minimum : {-48, -16, 16}) {
-    auto p = parameters();
+    auto p = Parameters();
     p.min_disparity = minimum;
     Matcher matcher(p);
-    EXPECT_EQ(matcher.invalid(), (minimum - 1) * kSteps);
+    EXPECT_EQ(matcher.Invalid(), (minimum - 1) * kSteps);
     for (int shift : {minimum, minimum + 20}) {
-      const cv::Mat& disparity = matcher.match(left, makeRight(left, shift));
-      const auto result = compare(disparity, matcher.invalid(), matcher.validWindow(kSize),
+      const cv::Mat& disparity = matcher.Match(left, MakeRight(left, shift));
+      const auto result = Compare(disparity, matcher.Invalid(), matcher.ValidWindow(kSize),
                                   [&](int, int) { return shift; });
       EXPECT_GT(result.matched, 0.99) << minimum << " " << shift;
       EXPECT_GT(result.right, 0.99) << minimum << " " << shift;
@@ -90,35 +90,35 @@ TEST_P(EveryAlgorithm, SearchesFromAnyMinimum) {
 }
 
 TEST_P(EveryAlgorithm, GivesLittleForUnrelatedImages) {
-  Matcher matcher(parameters());
-  const cv::Mat& disparity = matcher.match(makeTexture(kSize, 4), makeTexture(kSize, 5));
-  EXPECT_LT(cv::countNonZero(disparity != matcher.invalid()), 0.1 * kSize.area());
+  Matcher matcher(Parameters());
+  const cv::Mat& disparity = matcher.Match(MakeTexture(kSize, 4), MakeTexture(kSize, 5));
+  EXPECT_LT(cv::countNonZero(disparity != matcher.Invalid()), 0.1 * kSize.area());
 }
 
 TEST_P(EveryAlgorithm, TakesAnotherSizeInMidFlight) {
-  Matcher matcher(parameters());
+  Matcher matcher(Parameters());
   for (const cv::Size size : {kSize, cv::Size(640, 480), cv::Size(161, 121)}) {
-    const cv::Mat left = makeTexture(size, 6);
-    const cv::Mat& disparity = matcher.match(left, makeRight(left, 9));
+    const cv::Mat left = MakeTexture(size, 6);
+    const cv::Mat& disparity = matcher.Match(left, MakeRight(left, 9));
     EXPECT_EQ(disparity.size(), size);
     EXPECT_EQ(disparity.type(), CV_16SC1);
-    const auto result = compare(disparity, matcher.invalid(), matcher.validWindow(size),
+    const auto result = Compare(disparity, matcher.Invalid(), matcher.ValidWindow(size),
                                 [](int, int) { return 9; });
     EXPECT_GT(result.right, 0.99);
   }
 }
 
 TEST_P(EveryAlgorithm, RefusesWhatItCannotMatch) {
-  Matcher matcher(parameters());
-  const cv::Mat good = makeTexture(kSize, 7);
-  EXPECT_THROW(matcher.match({}, good), std::invalid_argument);
-  EXPECT_THROW(matcher.match(good, makeTexture({320, 239}, 7)), std::invalid_argument);
-  EXPECT_THROW(matcher.match(good, cv::Mat(kSize, CV_8UC3)), std::invalid_argument);
-  const cv::Mat small = makeTexture({40, 15}, 7);
-  EXPECT_THROW(matcher.match(small, small), std::invalid_argument);
-  const cv::Mat narrow = makeTexture({40, 40}, 7);  // narrower than the search: no match, no error
-  EXPECT_EQ(cv::countNonZero(matcher.match(narrow, narrow) != matcher.invalid()), 0);
-  EXPECT_GT(cv::countNonZero(matcher.match(good, makeRight(good, 9)) != matcher.invalid()), 0);
+  Matcher matcher(Parameters());
+  const cv::Mat good = MakeTexture(kSize, 7);
+  EXPECT_THROW(matcher.Match({}, good), std::invalid_argument);
+  EXPECT_THROW(matcher.Match(good, MakeTexture({320, 239}, 7)), std::invalid_argument);
+  EXPECT_THROW(matcher.Match(good, cv::Mat(kSize, CV_8UC3)), std::invalid_argument);
+  const cv::Mat small = MakeTexture({40, 15}, 7);
+  EXPECT_THROW(matcher.Match(small, small), std::invalid_argument);
+  const cv::Mat narrow = MakeTexture({40, 40}, 7);  // Narrower than the search: no match, no error.
+  EXPECT_EQ(cv::countNonZero(matcher.Match(narrow, narrow) != matcher.Invalid()), 0);
+  EXPECT_GT(cv::countNonZero(matcher.Match(good, MakeRight(good, 9)) != matcher.Invalid()), 0);
 }
 
 TEST(Matcher, RoundsItsParameters) {
@@ -136,29 +136,29 @@ TEST(Matcher, RoundsItsParameters) {
 }
 
 TEST(Matcher, NewParametersTakeEffect) {
-  const cv::Mat left = makeTexture(kSize, 8), right = makeRight(left, 70);
+  const cv::Mat left = MakeTexture(kSize, 8), right = MakeRight(left, 70);
   Matcher matcher;
-  EXPECT_LT(cv::countNonZero(matcher.match(left, right) == 70 * kSteps), 100);
+  EXPECT_LT(cv::countNonZero(matcher.Match(left, right) == 70 * kSteps), 100);
   MatcherParameters parameters;
   parameters.disparity_range = 96;
-  matcher.setParameters(parameters);
-  const auto result = compare(matcher.match(left, right), matcher.invalid(),
-                              matcher.validWindow(kSize), [](int, int) { return 70; });
+  matcher.SetParameters(parameters);
+  const auto result = Compare(matcher.Match(left, right), matcher.Invalid(),
+                              matcher.ValidWindow(kSize), [](int, int) { return 70; });
   EXPECT_GT(result.right, 0.99);
 }
 
 TEST(Matcher, ValidWindowIsWhereTheSearchStaysInside) {
   MatcherParameters parameters;
-  EXPECT_EQ(Matcher(parameters).validWindow(kSize), cv::Rect(70, 7, 320 - 7 - 70, 240 - 14));
+  EXPECT_EQ(Matcher(parameters).ValidWindow(kSize), cv::Rect(70, 7, 320 - 7 - 70, 240 - 14));
   parameters.min_disparity = -16;
-  EXPECT_EQ(Matcher(parameters).validWindow(kSize), cv::Rect(54, 7, 320 - 7 - 16 - 54, 240 - 14));
-  EXPECT_EQ(Matcher().validWindow({70, 240}), cv::Rect());
+  EXPECT_EQ(Matcher(parameters).ValidWindow(kSize), cv::Rect(54, 7, 320 - 7 - 16 - 54, 240 - 14));
+  EXPECT_EQ(Matcher().ValidWindow({70, 240}), cv::Rect());
 }
 
 TEST(Matcher, PixelsHaveTheOffsetTakenOff) {
   const cv::Mat fixed = (cv::Mat_<int16_t>(1, 3) << -16, 0, 12 * kSteps + 3);
   cv::Mat pixels;
-  toPixels(fixed, 2.5, pixels);
+  ToPixels(fixed, 2.5, &pixels);
   ASSERT_EQ(pixels.type(), CV_32FC1);
   EXPECT_FLOAT_EQ(pixels.at<float>(0), -3.5f);
   EXPECT_FLOAT_EQ(pixels.at<float>(1), -2.5f);
@@ -166,4 +166,4 @@ TEST(Matcher, PixelsHaveTheOffsetTakenOff) {
 }
 
 }  // namespace
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo

@@ -10,17 +10,17 @@
 
 #include "stereo/matcher.h"
 
-namespace tld_stereo {
+namespace tld_follower::stereo {
 namespace {
 
 struct Pair {
   const char *left, *right, *truth;
   int range;
-  double max_off;      // of the matched pixels, the share off by more than 1 pixel
-  double min_matched;  // of the pixels whose truth is known
+  double max_off;      // Of the matched pixels, the share off by more than 1 pixel.
+  double min_matched;  // Of the pixels whose truth is known.
 };
 
-void check(const Pair& pair, Algorithm algorithm) {
+void Check(const Pair& pair, Algorithm algorithm) {
   const char* data = std::getenv("TLD_FOLLOWER_DATA");
   if (!data) GTEST_SKIP() << "TLD_FOLLOWER_DATA is not set: no real pairs to match";
   const std::string folder = std::string(data) + "/stereo/";
@@ -35,7 +35,7 @@ void check(const Pair& pair, Algorithm algorithm) {
   parameters.algorithm = algorithm;
   parameters.disparity_range = pair.range;
   Matcher matcher(parameters);
-  const cv::Mat& disparity = matcher.match(left, right);
+  const cv::Mat& disparity = matcher.Match(left, right);
   int known = 0, matched = 0, off = 0;
   for (int v = 0; v < left.rows; ++v) {
     for (int u = 0; u < left.cols; ++u) {
@@ -43,7 +43,7 @@ void check(const Pair& pair, Algorithm algorithm) {
       if (!(d > 0)) continue;
       ++known;
       const int fixed = disparity.at<int16_t>(v, u);
-      if (fixed == matcher.invalid()) continue;
+      if (fixed == matcher.Invalid()) continue;
       ++matched;
       off += std::abs(static_cast<float>(fixed) / kSteps - d) > 1;
     }
@@ -59,20 +59,20 @@ void check(const Pair& pair, Algorithm algorithm) {
 const Pair kAloe{"aloe/aloeL.jpg", "aloe/aloeR.jpg", "aloe/aloeGT.png", 256, 0, 0};
 const Pair kCones{"cones/left.tif", "cones/right.tif", "cones/left_disp_gt.tif", 64, 0, 0};
 
-Pair bounded(Pair pair, double max_off, double min_matched) {
+Pair Bounded(Pair pair, double max_off, double min_matched) {
   pair.max_off = max_off;
   pair.min_matched = min_matched;
   return pair;
 }
 
 TEST(RealPairs, AloeBlockMatching) {
-  check(bounded(kAloe, 0.062, 0.57), Algorithm::kBlockMatching);
+  Check(Bounded(kAloe, 0.062, 0.57), Algorithm::kBlockMatching);
 }
-TEST(RealPairs, AloeSemiGlobal) { check(bounded(kAloe, 0.081, 0.66), Algorithm::kSemiGlobal); }
+TEST(RealPairs, AloeSemiGlobal) { Check(Bounded(kAloe, 0.081, 0.66), Algorithm::kSemiGlobal); }
 TEST(RealPairs, ConesBlockMatching) {
-  check(bounded(kCones, 0.056, 0.71), Algorithm::kBlockMatching);
+  Check(Bounded(kCones, 0.056, 0.71), Algorithm::kBlockMatching);
 }
-TEST(RealPairs, ConesSemiGlobal) { check(bounded(kCones, 0.077, 0.79), Algorithm::kSemiGlobal); }
+TEST(RealPairs, ConesSemiGlobal) { Check(Bounded(kCones, 0.077, 0.79), Algorithm::kSemiGlobal); }
 
 }  // namespace
-}  // namespace tld_stereo
+}  // namespace tld_follower::stereo
