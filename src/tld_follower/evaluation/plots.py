@@ -1,5 +1,8 @@
 """Plots and video of a flight, as thesis figures 4.3, 4.5 and 4.6 show theirs."""
 
+import os
+from contextlib import contextmanager
+
 import cv2
 import matplotlib
 import numpy as np
@@ -61,13 +64,27 @@ def plot_velocity(run, drive_s, title, path):
     plt.close(figure)
 
 
+@contextmanager
+def _quiet():
+    """Keep OpenCV's remark on WebM's codec tag, which it prints though all is well, off the terminal."""
+    stderr = os.dup(2)
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+
+
 class Video:
     """The left camera with the found box (green), the true one (white) and what the follower is doing."""
 
     def __init__(self, path, resolution, rate):
-        self._writer = cv2.VideoWriter(
-            str(path), cv2.VideoWriter_fourcc(*"VP80"), rate / _FRAME_STEP, resolution
-        )
+        with _quiet():
+            self._writer = cv2.VideoWriter(
+                str(path), cv2.VideoWriter_fourcc(*"VP80"), rate / _FRAME_STEP, resolution
+            )
         if not self._writer.isOpened():
             raise OSError(f"cannot write a video to {path}")
         self._count = 0
