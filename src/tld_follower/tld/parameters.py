@@ -68,11 +68,11 @@ class Parameters:
     widen_frames: int = 8
 
     align_step: float = 0.06
-    align_gain: float = 0.3
+    align_gain: float = 0.45
     align_similarity: float = 0.8
     takeover_overlap: float = 0.5
     fusion_overlap: float = 0.7
-    fusion_weight: float = 10.0
+    fusion_weight: float = 30.0
 
     sift_keypoints: int = 200
     sift_side: float = 400.0

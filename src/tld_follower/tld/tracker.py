@@ -194,8 +194,10 @@ class Tracker:
         if len(clusters) == 1:
             if clusters[0].confidence > self._detector.nn_threshold:
                 return self._take(clusters[0].box, clusters[0].confidence)
-            self._box = clusters[0].box
-            self._trust.restart(provisional=True)
+            change = abs(np.log(clusters[0].box.width / self._last_box.width))
+            if change < self._parameters.tracking_scales * np.log(self._parameters.scale_step):
+                self._box = clusters[0].box
+                self._trust.restart(provisional=True)
         elif not clusters and self._parameters.tracker == "tld_sift":
             proposal = self._memory.propose(frame, self._last_box)
             if proposal is not None:

@@ -75,7 +75,8 @@ class Trust:
             self._steady = 0
             return False
         self._provisional = False
-        self._steady = self._steady + 1 if steady and relative >= parameters.lost_threshold else 0
+        certain = parameters.provisional_threshold if self._doubtful else parameters.lost_threshold
+        self._steady = self._steady + 1 if steady and relative >= certain else 0
         if self._steady > parameters.confirm_frames and (self.valid or relative > accepted):
             self._doubtful = False
         self.valid = self.valid or conservative > parameters.valid_threshold
