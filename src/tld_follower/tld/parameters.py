@@ -64,6 +64,7 @@ class Parameters:
     provisional_threshold: float = 0.55
     max_residual: float = 0.05
     confirm_frames: int = 3
+    patience_frames: int = 8
     grace_frames: int = 10
     widen_frames: int = 8
 
@@ -77,6 +78,7 @@ class Parameters:
     sift_keypoints: int = 200
     sift_side: float = 400.0
     sift_views: int = 10
+    sift_interval: int = 10
 
     def __post_init__(self) -> None:
         for field in fields(self):

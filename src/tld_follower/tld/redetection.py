@@ -22,15 +22,21 @@ class SiftMemory:
     ----------
     keypoints : the detector of keypoints.
     views : most views kept.
+    interval : calls of `learn` for each view taken.
     """
 
-    def __init__(self, keypoints: SiftKeypoints, views: int) -> None:
+    def __init__(self, keypoints: SiftKeypoints, views: int, interval: int) -> None:
         self._keypoints = keypoints
+        self._interval = interval
+        self._calls = 0
         self._views: list[tuple[np.ndarray, np.ndarray]] = []
         self._capacity = views
 
     def learn(self, frame: Frame, box: Box) -> None:
-        """Remember the keypoints inside a trusted box; the oldest view but the first goes when full."""
+        """Take in a trusted box; the oldest view but the first goes when the memory is full."""
+        self._calls += 1
+        if (self._calls - 1) % self._interval:
+            return
         points, descriptors = self._keypoints.detect(frame, box)
         if len(points) == 0:
             return

@@ -100,7 +100,7 @@ class Tracker:
         self._learner.initialise(frame, inside)
         if parameters.tracker == "tld_sift":
             self._sift = keypoints.SiftKeypoints(parameters.sift_keypoints, parameters.sift_side)
-            self._memory = SiftMemory(self._sift, parameters.sift_views)
+            self._memory = SiftMemory(self._sift, parameters.sift_views, parameters.sift_interval)
             self._memory.learn(frame, inside)
         self._frame = frame
         self._box: Box | None = inside
@@ -251,6 +251,8 @@ class Tracker:
         if frame.variance(np.array(box.as_tuple())) < self._detector.min_variance:
             return
         self._learner.update(frame, box, detections)
+        if self._parameters.tracker == "tld_sift":
+            self._memory.learn(frame, box)
 
 
 def warm_up() -> None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from tld_follower.tld.parameters import Parameters
 
+# A weak frame in which the points also part company is worth this many weak frames.
+UNSTEADY_WEIGHT = 2
+
 
 class Trust:
     """The evidence for the box that is followed.
@@ -24,6 +27,7 @@ class Trust:
         self.missed = 0
         self._doubtful = False
         self._provisional = False
+        self._weak = 0
         self._steady = parameters.confirm_frames
 
     @property
@@ -41,6 +45,7 @@ class Trust:
         self.valid = False
         self._doubtful = True
         self._provisional = provisional
+        self._weak = 0
         self._steady = 0
 
     def drop(self) -> None:
@@ -75,6 +80,13 @@ class Trust:
             self._steady = 0
             return False
         self._provisional = False
+        sure = relative > accepted - parameters.redetection_margin
+        if sure or not self._doubtful:
+            self._weak = 0
+        else:
+            self._weak += 1 if steady else UNSTEADY_WEIGHT
+        if self._weak > parameters.patience_frames:
+            return False
         certain = parameters.provisional_threshold if self._doubtful else parameters.lost_threshold
         self._steady = self._steady + 1 if steady and relative >= certain else 0
         if self._steady > parameters.confirm_frames and (self.valid or relative > accepted):
