@@ -26,18 +26,22 @@ class Box:
 
     @property
     def right(self) -> float:
+        """The right edge, x [pixel]."""
         return self.x + self.width
 
     @property
     def bottom(self) -> float:
+        """The lower edge, y [pixel]."""
         return self.y + self.height
 
     @property
     def center(self) -> tuple[float, float]:
+        """The centre, x and y [pixel]."""
         return self.x + 0.5 * self.width, self.y + 0.5 * self.height
 
     @property
     def area(self) -> float:
+        """Area [pixel^2]."""
         return self.width * self.height
 
     @property
@@ -46,6 +50,7 @@ class Box:
         return all(math.isfinite(v) for v in (self.x, self.y, self.width, self.height))
 
     def as_tuple(self) -> tuple[float, float, float, float]:
+        """Return x, y, width, height."""
         return self.x, self.y, self.width, self.height
 
     def intersection(self, other: Box) -> float:
@@ -77,4 +82,5 @@ class Box:
 
     @classmethod
     def from_center(cls, x: float, y: float, width: float, height: float) -> Box:
+        """Build from the centre and the size [pixel]."""
         return cls(x - 0.5 * width, y - 0.5 * height, width, height)

@@ -104,8 +104,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "folders", nargs="+", type=Path, metavar="DIR", help="sequence folder; plain files are passed over"
     )
-    parser.add_argument("--tracker", nargs="+", choices=TRACKERS, default=["tld"], help="trackers to run (tld)")
-    parser.add_argument("--clips", type=Path, metavar="CSV", help="run these clips instead of whole sequences")
+    parser.add_argument("--tracker", nargs="+", choices=TRACKERS, default=["tld"], help="default: tld")
+    parser.add_argument("--clips", type=Path, metavar="CSV", help="clips to run instead of whole sequences")
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help="change a parameter"
     )

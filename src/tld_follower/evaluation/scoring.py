@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scores of one tracker on one sequence.
 
-A true positive is a frame with the target in view and a box whose overlap (intersection over union) exceeds the
-threshold; a false positive is any other box; a false negative is a frame with the target in view that is no true
-positive. The first frame, where the target was given, counts as a true positive.
+A true positive is a frame with the target in view and a box whose overlap (intersection over union) exceeds
+the threshold; a false positive is any other box; a false negative is a frame with the target in view that is no
+true positive. The first frame, where the target was given, counts as a true positive.
 """
 
 from __future__ import annotations
@@ -33,10 +33,12 @@ class Counts:
 
     @property
     def precision(self) -> float:
+        """Share of the boxes given that are right, 0..1."""
         return self.tp / (self.tp + self.fp) if self.tp else 0.0
 
     @property
     def recall(self) -> float:
+        """Share of the frames with the target in view that have the right box, 0..1."""
         return self.tp / (self.tp + self.fn) if self.tp else 0.0
 
     @property
@@ -45,6 +47,7 @@ class Counts:
         return 2.0 * self.tp / (2.0 * self.tp + self.fp + self.fn) if self.tp else 0.0
 
     def as_dict(self) -> dict[str, float]:
+        """Return counts and scores under the names of the JSON file."""
         return {
             "tp": self.tp,
             "fp": self.fp,
@@ -74,7 +77,7 @@ def count(truth: Boxes, found: Boxes, min_overlap: float) -> Counts:
 
 
 def reentries(truth: Boxes) -> list[int]:
-    """Indices of the frames where the target comes into view again."""
+    """Return the indices of the frames where the target comes into view again."""
     return [i for i in range(1, len(truth)) if truth[i] is not None and truth[i - 1] is None]
 
 

@@ -58,6 +58,7 @@ class Ferns:
 
     @property
     def count(self) -> int:
+        """Number of ferns."""
         return self.posteriors.shape[0]
 
     def confidence(self, codes: np.ndarray) -> np.ndarray:
@@ -69,7 +70,9 @@ class Ferns:
         """
         return self.posteriors[np.arange(self.count), codes].mean(axis=1)
 
-    def train(self, codes: np.ndarray, labels: np.ndarray, threshold: float, negative_threshold: float) -> None:
+    def train(
+        self, codes: np.ndarray, labels: np.ndarray, threshold: float, negative_threshold: float
+    ) -> None:
         """Add the examples that are misclassified, one after the other (Kalal 2012: update on error only).
 
         Parameters
@@ -144,8 +147,20 @@ def fern_codes(image, corners, offsets):
 
 @njit(cache=True)
 def scan_windows(
-    image, integral, squares, grid, offsets, posteriors, min_variance, min_confidence, sparse, near, corners,
-    confidences, codes, filled,
+    image,
+    integral,
+    squares,
+    grid,
+    offsets,
+    posteriors,
+    min_variance,
+    min_confidence,
+    sparse,
+    near,
+    corners,
+    confidences,
+    codes,
+    filled,
 ):
     """Run the variance gate and the ferns over all windows of one size, with early exit.
 
@@ -167,8 +182,8 @@ def scan_windows(
     the number of rows filled; windows beyond M are dropped.
     """
     width, height, step_x, step_y = grid
-    win_w = int(round(width))
-    win_h = int(round(height))
+    win_w = round(width)
+    win_h = round(height)
     stride, phase = sparse
     rows, cols = image.shape
     ferns = offsets.shape[0]
@@ -183,13 +198,13 @@ def scan_windows(
     needed = min_confidence * ferns
     iy = 0
     while True:
-        y = int(round(iy * step_y))
+        y = round(iy * step_y)
         if y + win_h > rows:
             break
         ix = -1
         while True:
             ix += 1
-            x = int(round(ix * step_x))
+            x = round(ix * step_x)
             if x + win_w > cols:
                 break
             if (ix + 2 * iy + phase) % stride != 0 and not (

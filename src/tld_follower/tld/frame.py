@@ -49,6 +49,7 @@ class Level:
 
     @cached_property
     def blurred(self) -> NDArray[np.uint8]:
+        """The blurred copy, (H, W)."""
         return cv2.GaussianBlur(self.gray, (0, 0), self._blur)
 
     @cached_property
@@ -73,10 +74,12 @@ class Frame:
 
     @property
     def width(self) -> int:
+        """Width [pixel]."""
         return self.gray.shape[1]
 
     @property
     def height(self) -> int:
+        """Height [pixel]."""
         return self.gray.shape[0]
 
     def level(self, index: int) -> Level:

@@ -13,12 +13,12 @@ from tld_follower.tld.frame import Frame
 from tld_follower.tld.parameters import Parameters
 from tld_follower.tld.windows import WindowSize
 
-# Negatives at the start are shown twice, as in Kalal's bootstrap: later ones are then judged by trained ferns.
+# The first examples are shown twice, as in Kalal's bootstrap: in the second round trained ferns judge them.
 INITIAL_ROUNDS = 2
 
 
 class Learner:
-    """Trains a detector by the P-constraint (windows on the target) and the N-constraint (all far from it)."""
+    """Trains a detector: windows on the target are positive, all far from it negative (P-N constraints)."""
 
     def __init__(self, detector: Detector, parameters: Parameters, rng: np.random.Generator) -> None:
         self._detector = detector
@@ -118,9 +118,9 @@ class Learner:
         # The crop holds all windows and the reach of the blur about them.
         reach = int(np.ceil(2.0 * parameters.blur))
         low = np.min([corners.min(axis=0) for _, corners in groups], axis=0) - reach
-        high = np.max([c.max(axis=0) + [round(s.grid[0]), round(s.grid[1])] for s, c in groups], axis=0) + reach
-        x0, y0 = np.maximum(low, 0)
-        x1, y1 = np.minimum(high, [level.gray.shape[1], level.gray.shape[0]])
+        high = np.max([corners.max(axis=0) + np.rint(s.grid[:2]) for s, corners in groups], axis=0) + reach
+        x0, y0 = np.maximum(low, 0).tolist()
+        x1, y1 = np.minimum(high, level.gray.shape[::-1]).astype(int).tolist()
         crop = level.gray[y0:y1, x0:x1]
         local = [(np.ascontiguousarray(c - [x0, y0], np.int32), s.offsets) for s, c in groups]
         center = np.array(box.center) / factor - [x0, y0] - 0.5

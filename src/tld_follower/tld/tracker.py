@@ -63,6 +63,7 @@ class Tracker:
 
     @property
     def initialised(self) -> bool:
+        """True once a target was given."""
         return self._frame is not None
 
     @property
