@@ -2,8 +2,8 @@
 """Scores of one tracker on one sequence.
 
 A true positive is a frame with the target in view and a box whose overlap (intersection over union) exceeds
-the threshold; a false positive is any other box; a false negative is a frame with the target in view that is no
-true positive. The first frame, where the target was given, counts as a true positive.
+the threshold; a false positive is any other box; a false negative is a frame with the target in view that is
+no true positive. The first frame, where the target was given, counts as a true positive.
 """
 
 from __future__ import annotations

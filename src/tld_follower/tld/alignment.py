@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Local search for the box that looks most like the target, against the drift of the frame-to-frame tracker."""
+"""Local search for the box that looks most like the target, against the drift of the tracker."""
 
 from __future__ import annotations
 
@@ -45,6 +45,6 @@ def align(frame: Frame, model: ObjectModel, box: Box, step: float) -> tuple[Box,
 
 
 def blend(box: Box, other: Box, weight: float) -> Box:
-    """Return the box between two: their centres averaged with `weight` on `other`, and their sizes likewise."""
+    """Return the box between two, corners and sizes averaged with `weight` on `other`."""
     first, second = np.array(box.as_tuple()), np.array(other.as_tuple())
     return Box(*map(float, first + weight * (second - first)))

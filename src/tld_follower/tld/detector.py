@@ -128,9 +128,21 @@ class Detector:
             (around.y + around.height) / size.factor,
         )
         return scan_windows(
-            level.blurred, integral, squares, size.grid, size.offsets, self.ferns.posteriors, self.min_variance,
-            threshold, sparse, near, self._corners, self._confidences, self._codes, filled,
-        )  # fmt: skip
+            level.blurred,
+            integral,
+            squares,
+            size.grid,
+            size.offsets,
+            self.ferns.posteriors,
+            self.min_variance,
+            threshold,
+            sparse,
+            near,
+            self._corners,
+            self._confidences,
+            self._codes,
+            filled,
+        )
 
     def detect(self, frame: Frame, around: Box, scales: int) -> Detections:
         """Run the whole cascade; see `scan`. At most `max_candidates` windows reach the nearest neighbour."""

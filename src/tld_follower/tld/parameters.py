@@ -3,11 +3,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
 TRACKERS = ("tld", "tld_sift")
+LOWER_BOUNDS = {
+    **{"scale_step": 1.0, "shift": 0.0, "min_side": 2.0, "flow_side": 0.0, "window_side": 2.0},
+    **{"blur": 0.0, "fusion_weight": 0.0, "max_residual": 0.0, "lk_window": 2, "sift_side": 8.0},
+}
+# A fern has a table of 2^comparisons posteriors.
+MAX_COMPARISONS = 20
 
 
 @dataclass(frozen=True)
@@ -88,12 +95,19 @@ class Parameters:
                 object.__setattr__(self, field.name, float(value))
             elif type(value) is not kind:
                 raise ValueError(f"parameter {field.name} must be of type {kind.__name__}, got {value!r}")
-            elif kind in (int, float) and not value > 0:
-                raise ValueError(f"parameter {field.name} must be positive, got {value!r}")
+            elif kind is int and value < 1:
+                raise ValueError(f"parameter {field.name} must be at least 1, got {value}")
+            elif kind is float and not 0.0 <= value < math.inf:
+                raise ValueError(f"parameter {field.name} must not be negative or infinite, got {value}")
         if self.tracker not in TRACKERS:
             raise ValueError(f"parameter tracker must be one of {', '.join(TRACKERS)}, got {self.tracker!r}")
-        if self.scale_step <= 1.0:
-            raise ValueError(f"parameter scale_step must exceed 1, got {self.scale_step}")
+        for name, bound in LOWER_BOUNDS.items():
+            if getattr(self, name) <= bound:
+                raise ValueError(f"parameter {name} must exceed {bound:g}, got {getattr(self, name)}")
+        if self.comparisons > MAX_COMPARISONS:
+            raise ValueError(
+                f"parameter comparisons must be at most {MAX_COMPARISONS}, got {self.comparisons}"
+            )
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Parameters:

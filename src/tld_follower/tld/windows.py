@@ -50,8 +50,8 @@ def window_sizes(box: Box, comparisons: np.ndarray, parameters: Parameters) -> l
     """Return the window sizes about that of the initial box, smallest first.
 
     They differ by `scale_step`, `scales` of them to either side; those with a side under `min_side` are left
-    out. Each is scanned on the octave where its side (root of the area) is `window_side` to twice that, so that
-    the blur is in proportion and large windows cost no more than small ones.
+    out. Each is scanned on the octave where its side (root of the area) is `window_side` to twice that, so
+    that the blur is in proportion and large windows cost no more than small ones.
     """
     sizes = []
     for exponent in range(-parameters.scales, parameters.scales + 1):
