@@ -1,5 +1,6 @@
 """Flies one scenario on a running graph in lockstep: drives the target, boxes it, keeps the trace."""
 
+import math
 import threading
 import time
 
@@ -14,6 +15,11 @@ from tld_follower.nodes.conversions import message_box
 
 # How long one frame may take before the flight is given up; lockstep itself goes on after less.
 FRAME_TIMEOUT = 60.0  # s of wall-clock time
+
+
+def _known(value):
+    """Return a number, or None for NaN, which JSON has no word for."""
+    return None if math.isnan(value) else value
 
 
 class Flight:
@@ -150,8 +156,8 @@ class Flight:
         entry = {
             "t": round(t, 6),
             "distance": truth.distance,
-            "measured_distance": None if state.distance != state.distance else state.distance,
-            "nearest_obstacle": None if state.nearest_obstacle != state.nearest_obstacle else state.nearest_obstacle,
+            "measured_distance": _known(state.distance),
+            "nearest_obstacle": _known(state.nearest_obstacle),
             "clearance": truth.clearance,
             "collisions": truth.collisions,
             "drone_position": [getattr(truth.drone_pose.position, axis) for axis in "xyz"],
