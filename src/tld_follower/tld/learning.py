@@ -72,7 +72,7 @@ class Learner:
         self._train(codes[shuffled], labels[shuffled])
 
         patch = frame.patches(np.array([box.as_tuple()]))
-        if detector.model.similarity(patch).relative[0] <= detector.nn_threshold:
+        if detector.model.similarity(patch).relative[0] < parameters.positive_threshold:
             detector.model.positives.add(patch[0])
         self._add_negatives(detections.patches[far])
 

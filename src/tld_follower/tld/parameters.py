@@ -49,6 +49,7 @@ class Parameters:
     nn_threshold: float = 0.65
     redetection_margin: float = 0.07
     min_conservative: float = 0.47
+    positive_threshold: float = 0.8
     negative_threshold: float = 0.5
     max_positives: int = 200
     max_negatives: int = 300
@@ -68,11 +69,11 @@ class Parameters:
     valid_threshold: float = 0.7
     lost_threshold: float = 0.5
     steady_threshold: float = 0.4
-    provisional_threshold: float = 0.55
+    provisional_threshold: float = 0.58
     max_residual: float = 0.05
     confirm_frames: int = 3
-    patience_frames: int = 8
-    grace_frames: int = 10
+    patience_frames: int = 4
+    grace_frames: int = 20
     widen_frames: int = 8
 
     align_step: float = 0.06

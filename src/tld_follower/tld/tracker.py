@@ -11,7 +11,7 @@ import numpy as np
 from tld_follower.box import Box
 from tld_follower.tld import keypoints, median_flow
 from tld_follower.tld.alignment import align, blend
-from tld_follower.tld.detector import Detections, Detector, overlaps
+from tld_follower.tld.detector import Cluster, Detections, Detector, overlaps
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.learning import Learner
 from tld_follower.tld.median_flow import Flow
@@ -193,13 +193,8 @@ class Tracker:
         self._drop()
         clusters = self._detector.clusters(detections)
         if len(clusters) == 1:
-            if clusters[0].confidence > self._detector.nn_threshold:
-                return self._take(clusters[0].box, clusters[0].confidence)
-            change = abs(np.log(clusters[0].box.width / self._last_box.width))
-            if change < self._parameters.tracking_scales * np.log(self._parameters.scale_step):
-                self._box = clusters[0].box
-                self._trust.restart(provisional=True)
-        elif not clusters and self._parameters.tracker == "tld_sift":
+            return self._go_to(clusters[0])
+        if not clusters and self._parameters.tracker == "tld_sift":
             proposal = self._memory.propose(frame, self._last_box)
             if proposal is not None:
                 box, _ = align(frame, self._detector.model, proposal, self._parameters.align_step)
@@ -209,6 +204,17 @@ class Tracker:
                     and conservative > self._parameters.min_conservative
                 ):
                     return self._take(box, relative)
+        return LOST
+
+    def _go_to(self, cluster: Cluster) -> Result:
+        """Follow a cluster of detections from here: at once if it is sure, else if the next frame agrees."""
+        if cluster.confidence > self._detector.nn_threshold:
+            return self._take(cluster.box, cluster.confidence)
+        change = abs(np.log(cluster.box.width / self._last_box.width))
+        if change < self._parameters.tracking_scales * np.log(self._parameters.scale_step):
+            self._box = cluster.box
+            self._velocity = (0.0, 0.0)
+            self._trust.restart(provisional=True)
         return LOST
 
     def _take(self, box: Box, confidence: float) -> Result:
