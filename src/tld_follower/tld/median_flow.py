@@ -62,7 +62,7 @@ def track(
     side = np.sqrt(box.area)
     # A large target is tracked on a smaller octave: the same points, a wider reach, bounded cost.
     octave = max(0, int(np.floor(np.log2(side / parameters.flow_side))))
-    before, after, factor, origin = _crops(previous, current, box, octave, parameters)
+    before, after, factor, origin = _crops(previous, current, box, octave, parameters, guess)
     start = (np.ascontiguousarray(points, np.float32) / factor - origin - 0.5).reshape(-1, 1, 2)
     shift = np.array(guess, np.float32) / factor
     options = {
@@ -100,7 +100,14 @@ def track(
     return Flow(moved, error, residual)
 
 
-def _crops(previous: Frame, current: Frame, box: Box, octave: int, parameters: Parameters):
+def _crops(
+    previous: Frame,
+    current: Frame,
+    box: Box,
+    octave: int,
+    parameters: Parameters,
+    guess: tuple[float, float],
+) -> tuple[np.ndarray, np.ndarray, int, np.ndarray]:
     """Cut the target's surroundings out of one octave of both frames.
 
     Returns
@@ -111,7 +118,7 @@ def _crops(previous: Frame, current: Frame, box: Box, octave: int, parameters: P
     before, after = previous.level(octave).gray, current.level(octave).gray
     factor = round(previous.height / before.shape[0])
     height, width = before.shape
-    margin = parameters.lk_window << parameters.lk_levels
+    margin = (parameters.lk_window << parameters.lk_levels) + int(max(map(abs, guess)) / factor)
     x0 = min(max(int(box.x / factor) - margin, 0), width - 1)
     y0 = min(max(int(box.y / factor) - margin, 0), height - 1)
     x1 = max(min(int(box.right / factor) + margin, width), x0 + 1)
