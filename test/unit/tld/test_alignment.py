@@ -1,15 +1,15 @@
+# SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
 import pytest
-from synthetic import scene, target_box
+from synthetic_video import Scene, moving_box
 
 from tld_follower.box import Box
 from tld_follower.tld.alignment import align, blend
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.object_model import ObjectModel
 
-PLACE = (60, 40)
-FRAME = Frame(scene(PLACE), 3.0)
-TRUTH = target_box(PLACE)
+TRUTH = moving_box(0)
+FRAME = Frame(Scene().frame(TRUTH), 3.0)
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_without_contrast_the_box_stays_as_it_is(model):
     assert similarity == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("box", [Box(-30, -20, 40, 34), Box(150, 110, 40, 34), Box(400, 0, 40, 34)])
+@pytest.mark.parametrize("box", [Box(-30, -20, 32, 28), Box(150, 110, 32, 28), Box(400, 0, 32, 28)])
 def test_boxes_over_the_edge_crash_nothing(model, box):
     aligned, similarity = align(FRAME, model, box, 0.06)
     assert aligned.finite

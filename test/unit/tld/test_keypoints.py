@@ -1,6 +1,7 @@
+# SPDX-License-Identifier: BSD-3-Clause
 import numpy as np
 import pytest
-from synthetic import texture
+from synthetic_video import texture
 
 from tld_follower.box import Box
 from tld_follower.tld.frame import Frame

@@ -1,6 +1,8 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import cv2
 import numpy as np
 import pytest
-from synthetic import moved, texture
+from synthetic_video import texture
 
 from tld_follower.box import Box
 from tld_follower.tld.frame import Frame
@@ -9,6 +11,14 @@ from tld_follower.tld.redetection import SiftMemory
 
 BLUR = 3.0
 BOX = Box(100.0, 80.0, 80.0, 70.0)
+
+
+def moved(image, dx, dy, scale):
+    """The image shifted, and scaled about its centre."""
+    height, width = image.shape
+    matrix = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), 0.0, scale)
+    matrix[:, 2] += dx, dy
+    return cv2.warpAffine(image, matrix, (width, height))
 
 
 def memory(views=10, interval=1):
