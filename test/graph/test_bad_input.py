@@ -68,7 +68,7 @@ class Camera:
             picture = (pictures or (self.left, self.right))[i]
             info = infos[i] if infos else self.info(side)
             message = Image(height=picture.shape[0], width=picture.shape[1], encoding=encoding)
-            message.step, message.data = picture[0].nbytes, picture.tobytes()
+            message.step, message.data = picture[:1].nbytes, picture.tobytes()
             for part in (message, info):
                 part.header.stamp, part.header.frame_id = stamp, "stereo_left_optical_frame"
             self._infos[i].publish(info)
@@ -88,6 +88,7 @@ class BadInputTest(unittest.TestCase):
         rospy.Subscriber("/pointsdepthA/state", FollowState, lambda m: cls.count("states"))
         rospy.Subscriber("/NODE/target", RegionOfInterest, lambda m: cls.count("target"))
         rospy.Subscriber("/cmd_vel", Twist, lambda m: cls.count("command"))
+        rospy.Subscriber("/NODE/view", Image)  # somebody looks, so that pictures are drawn as well
         rospy.Subscriber("/rosout", Log, cls.read)
         cls.init = rospy.Publisher("/NODE/init", RegionOfInterest, queue_size=1)
         cls.stamped = rospy.Publisher("/pointstampA", BoundingBoxStamped, queue_size=1)
@@ -110,6 +111,7 @@ class BadInputTest(unittest.TestCase):
                 ("/NODE", "/pointA", "/stamp"),
                 ("/NODE", "/pointA", me),
                 ("/NODE", "/NODE/target", me),
+                ("/NODE", "/NODE/view", me),
                 ("/pointsdepthA", "/pointsdepthA/state", me),
                 ("/pointsdepthA", "/cmd_vel", me),
             }
@@ -197,6 +199,23 @@ class BadInputTest(unittest.TestCase):
             self.assert_hovers(self.state(**shot))
             self.said("/NODE", words)
             self.assert_follows()
+
+    def test_empty_image(self):
+        empty = np.zeros((0, 0), np.uint8)
+        stamp = self.camera.shoot(pictures=(empty, empty))
+        self.assert_hovers(self.state_of(stamp))
+        self.said("/NODE", "empty image")
+        self.assert_follows()
+
+    def test_box_partly_outside_is_cut_to_the_image(self):
+        targets = self.seen["target"]
+        self.init.publish(RegionOfInterest(x_offset=220, y_offset=140, width=300, height=300))
+        self.wait(lambda: self.seen["target"] > targets, "the target is learnt")
+        stamp = self.camera.shoot()
+        self.wait(lambda: stamp in self.seen["box"], "a box")
+        box = self.seen["box"][stamp]
+        self.assertTrue(box.visible)
+        self.assertLess(box.x + box.width, WIDTH + 15)
 
     def test_image_of_another_encoding_in_mid_flight_is_fine(self):
         colour = [np.dstack([picture] * 3) for picture in (self.camera.left, self.camera.right)]

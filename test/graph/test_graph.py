@@ -69,6 +69,10 @@ class GraphTest(unittest.TestCase):
         rospy.init_node("graph_test")
         wait_for_edges(FLYING_EDGES, timeout=WAIT)
 
+    def tearDown(self):
+        for node in TABLE:
+            self.assertTrue(rosnode.rosnode_ping(node, max_count=1, verbose=False), f"{node} is dead")
+
     def test_nodes_and_topics(self):
         publishers, subscribers, _ = rosgraph.Master("/graph_test").getSystemState()
         nodes = {node for _, names in [*publishers, *subscribers] for node in names}
@@ -92,10 +96,6 @@ class GraphTest(unittest.TestCase):
         readers = {node for topic, names in subscribers if topic in TRUTH for node in names}
         self.assertLessEqual(readers, {rospy.get_name()})
 
-    def test_every_node_answers(self):
-        for node in TABLE:
-            self.assertTrue(rosnode.rosnode_ping(node, max_count=1, verbose=False), f"{node} is dead")
-
     def test_from_image_to_command(self):
         truth, boxes = Collected("/gazebo/truth", Truth), Collected("/pointA", BoundingBox)
         stamped = Collected("/pointstampA", BoundingBoxStamped)
@@ -117,7 +117,11 @@ class GraphTest(unittest.TestCase):
         self.assertTrue(
             states.wait(lambda m: m[-1].mode == FollowState.FOLLOWING), "the follower does not follow"
         )
-        self.assertAlmostEqual(states.messages[-1].distance, truth.messages[-1].distance, delta=0.3)
+        # The drone stands well beyond the set distance: a distance that is not measured would show.
+        first = next(state for state in states.messages if state.mode == FollowState.FOLLOWING)
+        true = next(message for message in truth.messages if message.header.stamp == first.header.stamp)
+        self.assertGreater(true.distance, 1.4)
+        self.assertAlmostEqual(first.distance, true.distance, delta=0.15)
 
         # Box, its stamped form and its cloud carry the stamp of the image.
         images = {message.header.stamp for message in truth.messages}

@@ -2,7 +2,9 @@
 
 import argparse
 import json
+import math
 import re
+import signal
 import sys
 import tempfile
 import time
@@ -34,16 +36,16 @@ COLUMNS = (
 
 
 def _resolution(text):
-    if not re.fullmatch(r"\d+x\d+", text):
+    if not re.fullmatch(r"[1-9]\d{1,3}x[1-9]\d{1,3}", text):
         raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT")
     return text
 
 
-def _positive(convert):
+def _number(convert, least, description):
     def parse(text):
         value = convert(text)
-        if not value > 0:
-            raise argparse.ArgumentTypeError(f"{text} is not positive")
+        if not least <= value < math.inf:
+            raise argparse.ArgumentTypeError(f"{text} is not {description}")
         return value
 
     return parse
@@ -55,13 +57,19 @@ def parse_arguments(argv):
     parser.add_argument("scenario", choices=sorted(SCENARIOS))
     parser.add_argument("--distance", choices=("stereo", "box"), default="stereo")
     parser.add_argument("--control", choices=("thesis",), default="thesis")
-    parser.add_argument("--max-speed", type=_positive(float), default=1.5, metavar="M/S")
+    parser.add_argument(
+        "--max-speed", type=_number(float, 0.01, "a positive number"), default=1.5, metavar="M/S"
+    )
     parser.add_argument("--tracker", choices=("tld", "tld_sift"), default="tld")
     parser.add_argument("--resolution", type=_resolution, default="640x480", metavar="WxH")
     parser.add_argument("--world", type=Path, metavar="FILE", help="SDF world (default: the testing grounds)")
-    parser.add_argument("--image-noise", type=float, default=1.0, metavar="SIGMA", help="grey levels")
-    parser.add_argument("--seeds", type=_positive(int), default=1, metavar="N", help="how many runs")
-    parser.add_argument("--first-seed", type=int, default=0, metavar="K")
+    parser.add_argument(
+        "--image-noise", type=_number(float, 0, "0 or more"), default=1.0, metavar="SIGMA", help="grey levels"
+    )
+    parser.add_argument(
+        "--seeds", type=_number(int, 1, "a positive number"), default=1, metavar="N", help="how many runs"
+    )
+    parser.add_argument("--first-seed", type=_number(int, 0, "a seed: 0 or more"), default=0, metavar="K")
     parser.add_argument("--json", type=Path, metavar="F", help="write settings, figures and traces")
     parser.add_argument(
         "--report", type=Path, metavar="DIR", help="write plots, and a video of the first run"
@@ -133,6 +141,15 @@ def write_report(result, directory, drive_s):
     return distance, velocity
 
 
+def prepare_outputs(settings):
+    """Make the folders of report and JSON; raises OSError before anything has flown in vain."""
+    if settings.report:
+        settings.report.mkdir(parents=True, exist_ok=True)
+    if settings.json:
+        settings.json.resolve().parent.mkdir(parents=True, exist_ok=True)
+        settings.json.open("a").close()
+
+
 def main(argv=None):
     """Run the command; returns the exit code."""
     settings = parse_arguments(argv)
@@ -140,9 +157,13 @@ def main(argv=None):
         print(f"experiment: no world file {settings.world}", file=sys.stderr)
         return 2
     scenario = SCENARIOS[settings.scenario]
-    for directory in (settings.report, settings.json and settings.json.resolve().parent):
-        if directory:
-            directory.mkdir(parents=True, exist_ok=True)
+    try:
+        prepare_outputs(settings)
+    except OSError as error:
+        print(f"experiment: {error}", file=sys.stderr)
+        return 2
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)  # however it is ended, the graph ends with it
     result = {
         "scenario": scenario.name,
         "distance": settings.distance,

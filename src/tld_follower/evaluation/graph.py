@@ -1,5 +1,6 @@
 """The ROS graph from outside: start it on a master of its own, see its edges, wait until it is connected."""
 
+import ctypes
 import os
 import signal
 import socket
@@ -11,6 +12,8 @@ from contextlib import contextmanager
 import rosgraph
 
 _CALLER = "/graph_watcher"
+_ANSWER_TIMEOUT = 5.0  # s, of a node that hangs
+_PR_SET_PDEATHSIG = 1  # prctl(2)
 _CAMERAS = [f"/stereo/{side}/{topic}" for side in ("left", "right") for topic in ("image_raw", "camera_info")]
 
 # Who talks to whom in follow.launch: (publisher, topic, subscriber).
@@ -32,6 +35,15 @@ class GraphError(RuntimeError):
     """The graph did not start, lost a node or stands still."""
 
 
+class _Transport(xmlrpc.client.Transport):
+    """Gives up on a node that does not answer."""
+
+    def make_connection(self, host):
+        connection = super().make_connection(host)
+        connection.timeout = _ANSWER_TIMEOUT
+        return connection
+
+
 def edges():
     """Return the connections that are up, a set of (publisher, topic, subscriber)."""
     publishers, subscribers, _ = rosgraph.Master(_CALLER).getSystemState()
@@ -40,7 +52,7 @@ def edges():
     for node in sorted(nodes):
         try:
             uri = rosgraph.Master(_CALLER).lookupNode(node)
-            links = xmlrpc.client.ServerProxy(uri).getBusInfo(_CALLER)[2]
+            links = xmlrpc.client.ServerProxy(uri, transport=_Transport()).getBusInfo(_CALLER)[2]
         except (rosgraph.MasterException, OSError, xmlrpc.client.Error):
             continue  # it is starting or has died
         found |= {
@@ -92,6 +104,23 @@ def stop(process, patience=20.0):
             continue
 
 
+def _die_with_parent():
+    """Have the kernel interrupt this process when its parent ends, however it ends."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
+
+
+def _start(command, output):
+    """Start a command in a process group of its own, all its output in a file."""
+    return subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=output,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+        preexec_fn=_die_with_parent,
+    )
+
+
 @contextmanager
 def private_master(log_directory):
     """Run a master on a free port, for this process and those it starts; the user's own one is left alone."""
@@ -100,14 +129,14 @@ def private_master(log_directory):
         "ROS_IP": "127.0.0.1",
         "ROS_LOG_DIR": str(log_directory),
     }
-    before = {name: os.environ.get(name) for name in [*environment, "ROS_HOSTNAME"]}
-    os.environ.pop("ROS_HOSTNAME", None)
+    foreign = ("ROS_HOSTNAME", "ROS_NAMESPACE")
+    before = {name: os.environ.get(name) for name in (*environment, *foreign)}
+    for name in foreign:
+        os.environ.pop(name, None)
     os.environ.update(environment)
     port = environment["ROS_MASTER_URI"].rsplit(":", 1)[1]
     with open(os.path.join(log_directory, "roscore.log"), "wb") as log:
-        core = subprocess.Popen(
-            ["roscore", "-p", port], stdout=log, stderr=subprocess.STDOUT, start_new_session=True
-        )
+        core = _start(["roscore", "-p", port], log)
     try:
         deadline = time.monotonic() + 30
         while "/rosout" not in _registered():
@@ -133,7 +162,7 @@ def _registered():
 
 @contextmanager
 def launched(launch_file, arguments, log):
-    """Run a launch file of this package; yields a function that raises GraphError once it has ended.
+    """Run a launch file of this package; yields a function that raises GraphError once a node has died.
 
     Parameters
     ----------
@@ -146,19 +175,16 @@ def launched(launch_file, arguments, log):
     """
     words = [f"{name}:={value}" for name, value in arguments.items()]
     with open(log, "wb") as output:
-        process = subprocess.Popen(
-            ["roslaunch", "tld_follower", launch_file, *words],
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
+        process = _start(["roslaunch", "tld_follower", launch_file, *words], output)
 
     def alive():
-        if process.poll() is not None:
-            with open(log, errors="replace") as output:
-                tail = "".join(output.readlines()[-15:])
-            raise GraphError(f"{launch_file} ended early; see {log}, which ends with:\n{tail}")
+        with open(log, errors="replace") as text:
+            lines = text.readlines()
+        died = [line for line in lines if "has died" in line]
+        if died or process.poll() is not None:
+            faults = [line for line in lines if "FATAL" in line or "ERROR" in line or "Error" in line]
+            shown = "".join([*faults[:5], *died[:1]] or lines[-10:])
+            raise GraphError(f"{launch_file} lost a node or ended early; {log} says:\n{shown}")
 
     try:
         yield alive

@@ -1,49 +1,66 @@
 """Collision avoidance of thesis section 3.3: back off while anything in view is too near."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from tld_follower.following.distance import ranges
+from tld_follower.following.controller import HOVER, Command
 from tld_follower.following.mapping import to_velocity
 
 # Every second row and column: an obstacle at the minimum distance covers thousands of pixels.
 _STRIDE = 2
 
 
+@dataclass(frozen=True)
+class Nearest:
+    """The nearest thing in view: distance [m] and angle below the horizon [rad]; NaN if unknown."""
+
+    distance: float = math.nan
+    below: float = math.nan
+
+
 class Avoidance:
     """Watch the overall minimum of the depth, whatever it belongs to."""
 
     def __init__(self, parameters):
-        self._minimum = parameters.minimum_distance
-        self._hysteresis = parameters.clearance_hysteresis
-        self._fraction = parameters.obstacle_fraction
-        self._max_speed = parameters.max_speed
+        self._p = parameters
         self._active = False
 
     def nearest(self, cloud):
-        """Distance in metres of the nearest thing in view; NaN without any depth.
+        """Return the `Nearest` of a cloud: ndarray (height, width, 3) in metres, optical frame, or None.
 
-        `cloud` is an ndarray (height, width, 3) in metres, or None. The nearest points, as many as
-        `obstacle_fraction` of all pixels, are passed over: wrong matches come in small patches.
+        The nearest points, as many as `obstacle_fraction` of all pixels, are passed over: wrong matches come
+        in small patches.
         """
         if cloud is None:
-            return math.nan
-        sample = cloud[::_STRIDE, ::_STRIDE]
-        distances = ranges(sample)
-        passed_over = int(self._fraction * sample.shape[0] * sample.shape[1])
-        if distances.size <= passed_over:
-            return math.nan
-        return float(np.partition(distances, passed_over)[passed_over])
+            return Nearest()
+        points = cloud[::_STRIDE, ::_STRIDE].reshape(-1, 3)
+        passed_over = int(self._p.obstacle_fraction * len(points))
+        squares = np.einsum("ij,ij->i", points, points)
+        seen = np.isfinite(squares)
+        squares, points = squares[seen], points[seen]
+        if squares.size <= passed_over:
+            return Nearest()
+        order = np.argpartition(squares, passed_over)
+        x, y, z = points[order[: passed_over + 1]].mean(axis=0)
+        below = self._p.camera_pitch + math.atan2(y, math.hypot(x, z))
+        return Nearest(math.sqrt(squares[order[passed_over]]), below)
 
     def retreat(self, nearest):
-        """Backward speed in m/s (zero or negative) that clears the minimum distance.
+        """Return the `Command` that leads away from what is nearer than the minimum, or None.
 
-        Once it has begun it lasts until the minimum plus the hysteresis is clear, and it is never slower than
-        the hysteresis over the minimum maps to, so that it does end.
+        Backwards, as in the thesis, and upwards as far as the thing lies below: backing off alone never
+        clears the ground. Once it has begun it lasts until the minimum plus the hysteresis is clear. While
+        nothing is measured, as nearer than the cameras can match, it hovers.
         """
-        limit = self._minimum + (self._hysteresis if self._active else 0.0)
-        self._active = nearest < limit
+        if math.isnan(nearest.distance):
+            return HOVER if self._active else None
+        limit = self._p.minimum_distance + (self._p.clearance_hysteresis if self._active else 0.0)
+        self._active = nearest.distance < limit
         if not self._active:
-            return 0.0
-        return -to_velocity(max(limit - nearest, self._hysteresis), self._minimum, self._max_speed)
+            return None
+        gap = max(limit - nearest.distance, self._p.clearance_hysteresis)
+        speed = to_velocity(gap, self._p.minimum_distance, self._p.max_speed)
+        below = min(max(nearest.below, 0.0), math.pi / 2)
+        return Command(x=-speed * math.cos(below), z=min(speed * math.sin(below), self._p.max_climb_rate))

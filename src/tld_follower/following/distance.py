@@ -39,15 +39,13 @@ class StereoDistance:
         self._percentile = parameters.near_percentile
         self._min_points = parameters.min_points
 
-    def measure(self, box, target, cloud):
+    def measure(self, box, cloud):
         """Return the distance in metres, or NaN where the box holds too few points.
 
         Parameters
         ----------
         box : Box
             The target in pixels of the left image.
-        target : int
-            Which target it is; not needed here.
         cloud : ndarray of shape (height, width, 3), or None
             Points in metres, one for each pixel of the left image.
         """
@@ -68,12 +66,10 @@ class BoxDistance:
 
     def __init__(self, parameters):
         self._set_distance = parameters.set_distance
-        self._target = None
-        self._area = math.nan
+        self._area = None
 
-    def measure(self, box, target, cloud):
+    def measure(self, box, cloud):
         """Return the distance in metres; the arguments are those of `StereoDistance.measure`."""
-        area = box.width * box.height
-        if target != self._target:
-            self._target, self._area = target, area
-        return self._set_distance * math.sqrt(self._area / area)
+        if self._area is None:
+            self._area = box.area
+        return self._set_distance * math.sqrt(self._area / box.area)

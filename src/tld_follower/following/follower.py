@@ -1,10 +1,10 @@
 """The follower: one command for every box, and hover wherever it can't know better."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
-from tld_follower.following.avoidance import Avoidance
+from tld_follower.following.avoidance import Avoidance, Nearest
 from tld_follower.following.controller import HOVER, Command, ThesisController
 from tld_follower.following.distance import BoxDistance, StereoDistance
 
@@ -39,10 +39,15 @@ class Follower:
 
     def __init__(self, parameters):
         self._p = parameters
-        self._distance = (StereoDistance if parameters.distance == "stereo" else BoxDistance)(parameters)
         self._controller = ThesisController(parameters)
         self._avoidance = Avoidance(parameters)
+        self._take_target(0)
+
+    def _take_target(self, target):
+        """Start afresh for another target: the first box of it sets the scale of `distance: box`."""
+        self._target = target
         self._seen = False
+        self._distance = (StereoDistance if self._p.distance == "stereo" else BoxDistance)(self._p)
 
     def update(self, box, target, box_age, cloud, cloud_age):
         """Decide what to do about one box.
@@ -64,10 +69,12 @@ class Follower:
         -------
         State
         """
-        if cloud is not None and (not -self._p.max_age <= cloud_age <= self._p.max_age):
+        if target != self._target:
+            self._take_target(target)
+        if not -self._p.max_age <= cloud_age <= self._p.max_age:
             cloud = None
         if not -self._p.max_age <= box_age <= self._p.max_age:
-            return State(Mode.LOST if self._seen else Mode.WAITING, f"the newest box is {box_age:.2f} s old")
+            return State(Mode.LOST if self._seen else Mode.WAITING, "the newest box is too old")
         if box is None and not self._seen:
             return State(Mode.WAITING, "no target was shown yet")
 
@@ -75,18 +82,22 @@ class Follower:
         retreat = self._avoidance.retreat(nearest)
         if box is None:
             if retreat:
-                return State(Mode.AVOIDING, "something is too near", math.nan, nearest, Command(x=retreat))
-            return State(Mode.LOST, "the target is not in view", math.nan, nearest)
+                return State(Mode.AVOIDING, "something is too near", math.nan, nearest.distance, retreat)
+            return State(Mode.LOST, "the target is not in view", math.nan, nearest.distance)
 
         self._seen = True
-        distance = self._distance.measure(box, target, cloud)
+        distance = self._distance.measure(box, cloud)
         command = self._controller.command(box, distance)
         if retreat:
-            # Altitude is held: what is too near may be above or below. Yaw keeps the target in view.
-            command = Command(x=retreat, yaw=command.yaw)
-            return State(Mode.AVOIDING, "something is too near", distance, nearest, command)
+            command = replace(retreat, yaw=command.yaw)  # keeps the target in view
+            return State(Mode.AVOIDING, "something is too near", distance, nearest.distance, command)
         if cloud is None and self._p.distance == "stereo":
             return State(Mode.WAITING, "no fresh point cloud")
-        if math.isnan(distance):
-            return State(Mode.FOLLOWING, "no depth inside the box", distance, nearest, command)
-        return State(Mode.FOLLOWING, "the target is in view", distance, nearest, command)
+        reason = "no depth inside the box" if math.isnan(distance) else "the target is in view"
+        return State(Mode.FOLLOWING, reason, distance, nearest.distance, self._held_up(command, nearest))
+
+    def _held_up(self, command, nearest: Nearest):
+        """Do not descend onto what is near: a target low in the image would lead into the ground."""
+        if nearest.distance < self._p.minimum_distance + self._p.descent_margin:
+            return replace(command, z=max(command.z, 0.0))
+        return command

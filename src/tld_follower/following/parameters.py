@@ -26,18 +26,26 @@ class Parameters:
     near_percentile: float = 10.0
     min_points: int = 50
     obstacle_fraction: float = 0.005
+    descent_margin: float = 0.15
+    camera_pitch: float = 0.34
     max_age: float = 0.3
+    cloud_wait: float = 0.1
 
     def __post_init__(self):
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.type is float and type(value) is int:
+                object.__setattr__(self, field.name, float(value))  # YAML writes 1 for 1.0
+            elif type(value) is not field.type:
+                raise ValueError(f"{field.name} must be of type {field.type.__name__}, not {value!r}")
+            if field.type in (int, float) and not 0 < value < float("inf"):
+                raise ValueError(f"{field.name} must be positive and finite, not {value!r}")
         for name, choices in (("control", CONTROLS), ("distance", DISTANCES), ("lateral", LATERALS)):
             if getattr(self, name) not in choices:
                 raise ValueError(f"{name} must be one of {', '.join(choices)}, not {getattr(self, name)!r}")
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.type in (int, float) and not 0 < value < float("inf"):
-                raise ValueError(f"{field.name} must be positive and finite, not {value!r}")
-        if self.near_percentile > 100:
-            raise ValueError(f"near_percentile must be at most 100, not {self.near_percentile!r}")
+        for name, most in (("near_percentile", 100.0), ("obstacle_fraction", 0.5), ("camera_pitch", 1.5)):
+            if getattr(self, name) > most:
+                raise ValueError(f"{name} must be at most {most}, not {getattr(self, name)!r}")
         if self.minimum_distance >= self.set_distance:
             raise ValueError(
                 f"minimum_distance {self.minimum_distance} must be below set_distance {self.set_distance}"
@@ -46,8 +54,7 @@ class Parameters:
     @classmethod
     def from_dict(cls, values):
         """Create from a mapping; an unknown name raises ValueError."""
-        known = {field.name: field.type for field in fields(cls)}
-        unknown = sorted(set(values) - set(known))
+        unknown = sorted(set(values) - {field.name for field in fields(cls)})
         if unknown:
             raise ValueError(f"unknown parameter of the follower: {', '.join(unknown)}")
-        return cls(**{name: known[name](value) for name, value in values.items()})
+        return cls(**values)

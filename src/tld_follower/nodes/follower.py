@@ -30,14 +30,14 @@ class FollowerNode:
     """
 
     def __init__(self):
-        settings = dict(rospy.get_param("~", {}))
-        self._cloud_wait = settings.pop("cloud_wait", 0.1)
-        self._parameters = Parameters.from_dict(settings)
+        self._parameters = Parameters.from_dict(rospy.get_param("~", {}))
         self._follower = Follower(self._parameters)
         self._boxes = Newest()
         self._clouds = threading.Condition()
-        self._cloud = None  # the newest message
+        self._recent = {}  # stamp -> cloud, in order of arrival
         self._stamp = rospy.Time()
+        self._mode = None
+        self._starved = False
 
         self._command = rospy.Publisher("/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
         self._state = rospy.Publisher("~state", FollowState, queue_size=10, tcp_nodelay=True)
@@ -45,16 +45,33 @@ class FollowerNode:
         rospy.Subscriber("/pointstampA", BoundingBoxStamped, self._boxes.put, queue_size=1, tcp_nodelay=True)
 
     def _take_cloud(self, message):
+        stamp = message.header.stamp
         with self._clouds:
-            self._cloud = message
+            self._recent = {
+                at: cloud
+                for at, cloud in self._recent.items()
+                if 0 < (stamp - at).to_sec() < self._parameters.max_age
+            }
+            self._recent[stamp] = message
             self._clouds.notify_all()
 
     def run(self):
-        """Process boxes until ROS shuts down, then stop the drone."""
+        """Process boxes until ROS shuts down; the drone then hovers by its own command timeout."""
         while not rospy.is_shutdown():
-            message = self._boxes.take(timeout=0.5)
+            message = self._boxes.take(timeout=0.1)
             if message is not None:
                 self._process(message)
+            self._watch()
+
+    def _watch(self):
+        """Say so when boxes stop coming, and when they come again."""
+        starved = bool(self._stamp) and (rospy.Time.now() - self._stamp).to_sec() > self._parameters.max_age
+        if starved != self._starved:
+            self._starved = starved
+            if starved:
+                rospy.logwarn("no boxes on /pointstampA any more: the drone hovers by its command timeout")
+            else:
+                rospy.loginfo("boxes are coming again")
 
     def _process(self, message):
         stamp = message.header.stamp
@@ -62,8 +79,7 @@ class FollowerNode:
             rospy.logwarn("time jumped back by %.3f s; starting afresh", (self._stamp - stamp).to_sec())
             self._follower = Follower(self._parameters)
             with self._clouds:
-                if self._cloud is not None and self._cloud.header.stamp > stamp:
-                    self._cloud = None
+                self._recent = {at: cloud for at, cloud in self._recent.items() if at <= stamp}
         self._stamp = stamp
         cloud = self._paired_cloud(stamp)
         now = rospy.Time.now()
@@ -80,21 +96,20 @@ class FollowerNode:
 
     def _paired_cloud(self, stamp):
         """Return the cloud of this stamp; the newest one if it will not come in time."""
-        deadline = rospy.Time.now() + rospy.Duration(self._cloud_wait)
+        deadline = rospy.Time.now() + rospy.Duration(self._parameters.cloud_wait)
 
         def expected():
-            if self._boxes.waiting:
+            if self._boxes.waiting or stamp in self._recent:
                 return False
-            # Clouds come in order: one of this stamp or a later one means that no better one comes.
-            if self._cloud is None:
+            if not self._recent:
                 return self._parameters.distance == "stereo"
-            behind = (stamp - self._cloud.header.stamp).to_sec()
-            return 0 < behind < self._parameters.max_age
+            # Clouds come in order: after a later one, that of this stamp will not come.
+            return 0 < (stamp - max(self._recent)).to_sec() < self._parameters.max_age
 
         with self._clouds:
             while expected() and rospy.Time.now() < deadline and not rospy.is_shutdown():
                 self._clouds.wait(0.02)
-            return self._cloud
+            return self._recent.get(stamp) or (self._recent[max(self._recent)] if self._recent else None)
 
     def _points(self, cloud):
         try:
@@ -111,6 +126,9 @@ class FollowerNode:
         return points
 
     def _publish(self, header, state):
+        if state.mode != self._mode:
+            self._mode = state.mode
+            rospy.loginfo("%s: %s", state.mode.name, state.reason)
         command = twist(state.command)
         self._command.publish(command)
         self._state.publish(

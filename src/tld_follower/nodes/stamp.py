@@ -3,13 +3,14 @@
 import rospy
 
 from tld_follower.msg import BoundingBox, BoundingBoxStamped
+from tld_follower.nodes.settings import checked
 
 
 class StampNode:
     """Stamps with the box's own `captured`; with the time now where that is zero."""
 
     def __init__(self):
-        self._frame = rospy.get_param("~frame_id", "stereo_left_optical_frame")
+        self._frame = checked(rospy.get_param("~frame_id", "stereo_left_optical_frame"), "frame_id", str)
         self._publisher = rospy.Publisher("/pointstampA", BoundingBoxStamped, queue_size=10)
         rospy.Subscriber("/pointA", BoundingBox, self._stamp, tcp_nodelay=True)
 
@@ -23,5 +24,9 @@ class StampNode:
 def main():
     """Run the node until ROS shuts down."""
     rospy.init_node("stamp")
-    StampNode()
+    try:
+        StampNode()
+    except ValueError as error:
+        rospy.logfatal(str(error))
+        raise SystemExit(1) from error
     rospy.spin()

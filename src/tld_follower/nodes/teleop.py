@@ -1,5 +1,6 @@
 """/teleop_twist_keyboard: drives Husky from the terminal that the node was started in."""
 
+import math
 import os
 import select
 import sys
@@ -9,6 +10,8 @@ import tty
 
 import rospy
 from geometry_msgs.msg import Twist
+
+from tld_follower.nodes.settings import checked
 
 # key -> (forward, turn left), in units of the speed and the turn rate
 MOVES = {
@@ -71,6 +74,7 @@ def drive(keyboard, publisher, period):
             if select.select([sys.stdin], [], [], period)[0]:
                 key = os.read(sys.stdin.fileno(), 1).decode(errors="replace")
                 if not key:
+                    rospy.logwarn("the terminal is gone: no more keys")
                     break
                 keyboard.press(key)
             if keyboard.moving or moved:
@@ -86,12 +90,17 @@ def main():
     """Run the node until ROS shuts down; without a terminal it says so and stays idle."""
     rospy.init_node("teleop_twist_keyboard")
     publisher = rospy.Publisher("/husky/cmd_vel", Twist, queue_size=1)
-    keyboard = Keyboard(
-        rospy.get_param("~speed", 1.0),
-        rospy.get_param("~turn", 1.0),
-        rospy.get_param("~max_speed", 1.0),
-        rospy.get_param("~max_turn", 2.0),
-    )
+    defaults = {"speed": 1.0, "turn": 1.0, "max_speed": 1.0, "max_turn": 2.0}
+    try:
+        keyboard = Keyboard(
+            **{
+                name: checked(rospy.get_param(f"~{name}", value), name, float, lambda x: 0 < x < math.inf)
+                for name, value in defaults.items()
+            }
+        )
+    except ValueError as error:
+        rospy.logfatal(str(error))
+        raise SystemExit(1) from error
     if sys.stdin is None or not sys.stdin.isatty():
         rospy.loginfo(
             "no terminal to read keys from: staying idle; run 'rosrun tld_follower teleop_twist_keyboard'"

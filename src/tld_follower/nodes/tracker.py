@@ -10,6 +10,7 @@ from tld_follower.box import Box
 from tld_follower.msg import BoundingBox
 from tld_follower.nodes.conversions import box_message, grey_image, image_array
 from tld_follower.nodes.newest import Newest
+from tld_follower.nodes.settings import checked
 from tld_follower.tld.parameters import Parameters
 from tld_follower.tld.tracker import Tracker, warm_up
 
@@ -18,12 +19,13 @@ GREEN, WHITE = (0, 220, 0), (255, 255, 255)
 
 def parse_box(text):
     """Read `x,y,width,height` in pixels; an empty text is no box."""
-    values = [float(value) for value in str(text).strip("[]() ").split(",") if value.strip()]
-    if not values:
+    if not str(text).strip():
         return None
-    if len(values) != 4:
-        raise ValueError(f"a box is x,y,width,height in pixels, not {text!r}")
-    return Box(*values)
+    try:
+        x, y, width, height = map(float, str(text).strip("[]() ").split(","))
+    except ValueError as error:
+        raise ValueError(f"init_box must be x,y,width,height in pixels, not {text!r}") from error
+    return Box(x, y, width, height)
 
 
 class TrackerNode:
@@ -34,7 +36,8 @@ class TrackerNode:
 
     def __init__(self):
         settings = dict(rospy.get_param("~", {}))
-        seed, every_frame = settings.pop("seed", 0), settings.pop("every_frame", False)
+        seed = checked(settings.pop("seed", 0), "seed", int, lambda value: value >= 0)
+        every_frame = checked(settings.pop("every_frame", False), "every_frame", bool)
         self._request = parse_box(settings.pop("init_box", ""))
         self._tracker = Tracker(Parameters.from_dict(settings), seed=seed)
         self._work = Newest(every=every_frame)
@@ -72,8 +75,9 @@ class TrackerNode:
 
     def _process(self, message):
         stamp = message.header.stamp
-        if stamp < self._stamp:
-            rospy.logwarn("time jumped back by %.3f s; going on", (self._stamp - stamp).to_sec())
+        if stamp and stamp < self._stamp:
+            back = (self._stamp - stamp).to_sec()
+            rospy.logwarn_throttle(5.0, f"time jumped back by {back:.3f} s; going on")
         self._stamp = stamp
         box, confidence = None, 0.0
         try:
@@ -87,6 +91,8 @@ class TrackerNode:
                 box, confidence = result.box, result.confidence
         except ValueError as error:
             rospy.logerr_throttle_identical(5.0, f"image skipped: {error}")
+            self._boxes.publish(box_message(None, 0.0, stamp, self._targets))
+            return
         self._boxes.publish(box_message(box, confidence, stamp, self._targets))
         if self._view.get_num_connections():
             self._publish_view(message, box, confidence)
@@ -102,6 +108,7 @@ class TrackerNode:
         except ValueError as error:
             rospy.logerr(f"target refused: {error}")
             return None
+        box = box.clip(self._image.shape[1], self._image.shape[0])
         self._targets += 1
         rospy.loginfo(
             "target %d: x %g, y %g, %g x %g pixels", self._targets, box.x, box.y, box.width, box.height

@@ -86,7 +86,7 @@ def test_backs_off_from_anything_too_near_and_ends_it(box):
     state = step(follower, box=box, cloud=cloud)
     assert state.mode == Mode.AVOIDING
     assert state.command.x < 0
-    assert state.command.y == state.command.z == 0
+    assert state.command.y == 0
     assert state.nearest_obstacle == pytest.approx(0.4)
     cloud[:60, :80, 2] = 0.53  # within the hysteresis: goes on
     assert step(follower, box=box, cloud=cloud).mode == Mode.AVOIDING
@@ -125,6 +125,54 @@ def test_box_distance_needs_no_cloud_but_heeds_one():
     assert step(follower, cloud=scene(0.4)).mode == Mode.AVOIDING
 
 
+def ground(height, pitch=0.34):
+    """The cloud of flat ground, seen from `height` metres by a camera pitched down; f = 250 pixels."""
+    v, u = np.mgrid[:240, :320]
+    rays = np.dstack([(u - 160) / 250, (v - 120) / 250, np.ones(u.shape)])
+    down = rays[..., 1] * math.cos(pitch) + rays[..., 2] * math.sin(pitch)
+    return np.where(down > 0.05, height / down, np.nan)[..., None] * rays
+
+
+def test_backing_off_from_the_ground_climbs_until_it_is_clear():
+    follower = Follower(PARAMETERS)
+    step(follower, cloud=ground(1.0))
+    height = 0.34
+    for _ in range(600):
+        state = step(follower, box=None, cloud=ground(height))
+        if state.mode != Mode.AVOIDING:
+            break
+        assert state.command.z > 0
+        height += state.command.z / 30
+    assert state.mode == Mode.LOST
+    assert 0.34 < height < 0.5
+
+
+def test_does_not_descend_onto_what_is_near():
+    low = Box(130, 200, 60, 40)
+    assert step(Follower(PARAMETERS), box=low, cloud=ground(1.0)).command.z < 0
+    state = step(Follower(PARAMETERS), box=low, cloud=ground(0.42))
+    assert state.mode == Mode.FOLLOWING
+    assert state.command.z == 0
+
+
+def test_what_enters_the_blind_zone_is_not_forgotten():
+    follower = Follower(PARAMETERS)
+    step(follower, cloud=scene(2.0))
+    assert step(follower, cloud=scene(0.4)).mode == Mode.AVOIDING
+    state = step(follower, cloud=np.full((240, 320, 3), np.nan, np.float32))
+    assert (state.mode, state.command) == (Mode.AVOIDING, HOVER)
+
+
+def test_a_new_target_sets_the_scale_of_the_box_distance():
+    follower = Follower(replace(PARAMETERS, distance="box"))
+    assert step(follower, box=Box(140, 100, 40, 40)).distance == pytest.approx(1.0)
+    assert step(follower, box=Box(150, 110, 20, 20)).distance == pytest.approx(2.0)
+    assert step(follower, box=Box(150, 110, 20, 20), target=2).distance == pytest.approx(1.0)
+    # A tracker that was restarted counts its targets from one again, but begins with none.
+    assert step(follower, box=None, target=0).mode == Mode.WAITING
+    assert step(follower, box=Box(130, 90, 60, 60), target=2).distance == pytest.approx(1.0)
+
+
 @settings(max_examples=200, deadline=None)
 @given(st.data())
 def test_every_command_is_finite_and_within_the_caps(data):
@@ -152,7 +200,7 @@ def test_every_command_is_finite_and_within_the_caps(data):
         assert abs(command.z) <= parameters.max_climb_rate
         assert abs(command.yaw) <= parameters.max_yaw_rate
         if state.nearest_obstacle < parameters.minimum_distance and state.mode != Mode.WAITING:
-            assert command.x < 0
+            assert command.x < 0 or command.z > 0
 
 
 @pytest.mark.parametrize(
@@ -163,7 +211,12 @@ def test_every_command_is_finite_and_within_the_caps(data):
         {"lateral": "up"},
         {"max_speed": 0},
         {"max_age": math.nan},
-        {"near_percentile": 101},
+        {"near_percentile": 101.0},
+        {"obstacle_fraction": 5.0},
+        {"max_speed": [1]},
+        {"set_distance": "abc"},
+        {"image_width": 320.9},
+        {"min_points": True},
         {"minimum_distance": 1.5},
         {"nonsense": 1},
     ],
@@ -176,6 +229,5 @@ def test_wrong_parameters_are_refused(values):
 def test_the_config_file_gives_the_defaults():
     config = Path(__file__).resolve().parents[3] / "config" / "follower.yaml"
     values = yaml.safe_load(config.read_text())
-    values.pop("cloud_wait")  # the node's
     assert Parameters.from_dict(values) == Parameters()
     assert set(values) == set(Parameters.__dataclass_fields__)
