@@ -64,7 +64,10 @@ def test_plots_and_video_are_written(results):
     [
         (["loop-the-loop"], "invalid choice"),
         (["straight", "--resolution", "huge"], "WIDTHxHEIGHT"),
-        (["straight", "--max-speed", "-1"], "not positive"),
+        (["straight", "--max-speed", "-1"], "not a positive number"),
+        (["straight", "--max-speed", "inf"], "not a positive number"),
+        (["straight", "--first-seed", "-1"], "0 or more"),
+        (["straight", "--json", "/"], "directory"),
         (["straight", "--world", "nowhere.world"], "no world file"),
     ],
 )

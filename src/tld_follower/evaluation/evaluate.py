@@ -84,6 +84,8 @@ def parse_settings(settings: list[str]) -> dict[str, Any]:
         name, equals, text = setting.partition("=")
         if not equals:
             raise ValueError(f"--set wants NAME=VALUE, got {setting!r}")
+        if name == "tracker":
+            raise ValueError("--set tracker=...: use --tracker")
         if name not in kinds:
             raise ValueError(f"unknown tracker parameter: {name}")
         try:
@@ -99,6 +101,13 @@ def _parse_bool(text: str) -> bool:
     return text.lower() == "true"
 
 
+def _seed(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is not 0 or more")
+    return value
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="evaluate", description="Score trackers on annotated sequences.")
     parser.add_argument(
@@ -109,7 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help="change a parameter"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the tracker (0)")
+    parser.add_argument("--seed", type=_seed, default=0, help="seed of the tracker (0)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the scores")
     parser.add_argument("--report", type=Path, metavar="DIR", help="write tables, plot and contact sheets")
     return parser
@@ -139,7 +148,10 @@ def main(argv: list[str] | None = None) -> int:
         for sequence in selected:
             for parameters in chosen:
                 _tell(f"evaluate: {sequence.name}, {parameters.tracker}, {len(sequence.truth)} frames")
-                runs.append(run(sequence, parameters, arguments.seed))
+                try:
+                    runs.append(run(sequence, parameters, arguments.seed))
+                except ValueError as error:
+                    raise sequences.SequenceError(f"{sequence.name}: {error}") from error
         results = [one.scores() for one in runs]
         if arguments.json:
             arguments.json.write_text(json.dumps(results, indent=2) + "\n")

@@ -206,3 +206,16 @@ def test_real_sequences(real_sequences, tmp_path, name, low, high, while_absent)
     assert result["overlap"]["0.5"]["f"] > high
     assert result["boxes_while_absent"] <= while_absent
     assert result["reentries_found"] == result["reentries"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [(["--set", "tracker=tld_sift"], "use --tracker"), (["--seed", "-1"], "0 or more")],
+)
+def test_settings_that_would_be_overlooked_are_refused(arguments, reason, tmp_path, capsys):
+    try:
+        code = main([str(tmp_path), *arguments])
+    except SystemExit as end:  # argparse
+        code = end.code
+    assert code != 0
+    assert reason in capsys.readouterr().err
