@@ -2,10 +2,13 @@
 #include "sim/parameters_node.h"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace tld_follower::sim {
 namespace {
+
+constexpr double kFarthest = 1e4;  // Bound on the numbers of a place [m, rad].
 
 [[noreturn]] void Fail(const std::string& name, const std::string& what) {
   throw std::invalid_argument("parameter ~" + name + " must be " + what);
@@ -32,30 +35,44 @@ void ReadNotNegative(const ros::NodeHandle& handle, const std::string& name, dou
   if (*value < 0) Fail(name, "0 or more");
 }
 
-void ReadPlacement(const ros::NodeHandle& handle, const std::string& name,
-                   std::optional<Placement>* place) {
-  const std::string what = "a list [x, y, yaw] in m and rad, or empty";
+// ROS itself would round a fraction to the next whole number.
+int ReadWhole(const ros::NodeHandle& handle, const std::string& name, int value) {
+  const std::string what = "a whole number, 0 or more";
+  double number = value;
+  Read(handle, name, what, &number);
+  if (!(number >= 0 && number <= std::numeric_limits<int>::max()) || number != std::floor(number)) {
+    Fail(name, what);
+  }
+  return int(number);
+}
+
+// Three numbers, or none.
+std::vector<double> ReadPlace(const ros::NodeHandle& handle, const std::string& name,
+                              const std::string& list) {
+  const std::string what = "a list " + list + ", each from -10000 to 10000, or empty";
   std::vector<double> numbers;
   Read(handle, name, what, &numbers);
-  if (numbers.empty()) return;
-  if (numbers.size() != 3) Fail(name, what);
+  if (!numbers.empty() && numbers.size() != 3) Fail(name, what);
   for (const double number : numbers) {
-    if (!std::isfinite(number)) Fail(name, what);
+    if (!(std::abs(number) <= kFarthest)) Fail(name, what);
   }
-  *place = Placement{numbers[0], numbers[1], numbers[2]};
+  return numbers;
+}
+
+void ReadPlacement(const ros::NodeHandle& handle, const std::string& name,
+                   std::optional<Placement>* place) {
+  const std::vector<double> numbers = ReadPlace(handle, name, "[x, y, yaw] in m and rad");
+  if (!numbers.empty()) *place = Placement{numbers[0], numbers[1], numbers[2]};
 }
 
 void ReadCamera(const ros::NodeHandle& handle, StereoCamera* camera) {
-  Read(handle, "width", "a whole number", &camera->width);
-  Read(handle, "height", "a whole number", &camera->height);
+  camera->width = ReadWhole(handle, "width", camera->width);
+  camera->height = ReadWhole(handle, "height", camera->height);
   ReadPositive(handle, "hfov", &camera->hfov);
   ReadPositive(handle, "baseline", &camera->baseline);
   ReadFinite(handle, "camera_pitch", &camera->pitch);
-  std::vector<double> position;
-  const std::string what = "a list [x, y, z] in m";
-  Read(handle, "camera_position", what, &position);
+  const std::vector<double> position = ReadPlace(handle, "camera_position", "[x, y, z] in m");
   if (position.empty()) return;
-  if (position.size() != 3) Fail("camera_position", what);
   camera->position = {btScalar(position[0]), btScalar(position[1]), btScalar(position[2])};
 }
 
@@ -80,6 +97,7 @@ void ReadSpiri(const ros::NodeHandle& handle, SpiriParameters* p) {
   ReadNotNegative(handle, "spiri/heading_p", &p->heading_p);
   ReadNotNegative(handle, "spiri/yaw_rate_p", &p->yaw_rate_p);
   ReadPositive(handle, "spiri/max_tilt", &p->max_tilt);
+  if (!(p->max_tilt < M_PI / 2)) Fail("spiri/max_tilt", "less than pi/2");
   ReadNotNegative(handle, "spiri/max_speed_xy", &p->max_speed_xy);
   ReadNotNegative(handle, "spiri/max_speed_z", &p->max_speed_z);
   ReadNotNegative(handle, "spiri/max_yaw_rate", &p->max_yaw_rate);
@@ -132,9 +150,7 @@ NodeParameters ReadParameters(const ros::NodeHandle& handle) {
   Read(handle, "paused", "true or false", &result.paused);
   Read(handle, "lockstep_target", "true or false", &result.lockstep_target);
   ReadPositive(handle, "lockstep_timeout", &result.lockstep_timeout);
-  int seed = 0;
-  Read(handle, "seed", "a whole number", &seed);
-  simulation.seed = uint64_t(int64_t(seed));
+  simulation.seed = uint64_t(ReadWhole(handle, "seed", 0));
   ReadPositive(handle, "rate", &simulation.frame_rate);
   ReadNotNegative(handle, "image_noise", &simulation.image_noise);
   ReadPlacement(handle, "spiri_pose", &simulation.spiri_place);

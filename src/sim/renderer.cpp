@@ -12,6 +12,7 @@ namespace {
 // Stencil bits: what is the target, and where a shadow fell already.
 constexpr GLint kTargetBit = 1;
 constexpr GLint kShadowBit = 2;
+constexpr btScalar kFallbackSize = btScalar(0.5);  // Of what stands in for a mesh [m].
 constexpr double kSkyRadius = 100.0;
 
 constexpr const char* kLitVertex = R"(#version 330 core
@@ -175,13 +176,27 @@ size_t Renderer::AddMesh(const Geometry& geometry, double texture_size) {
   const auto [place, is_new] = mesh_by_key_.try_emplace(key.str(), meshes_.size());
   if (!is_new) return place->second;
   if (geometry.type == Geometry::Type::kMesh) {
-    const std::string file = resources_.Find(geometry.mesh);
-    if (file.empty()) throw std::runtime_error("cannot find the mesh '" + geometry.mesh + "'");
-    meshes_.emplace_back(LoadObj(file, geometry.size));
+    meshes_.emplace_back(LoadMesh(geometry));
   } else {
     meshes_.emplace_back(MakePrimitive(geometry, texture_size));
   }
   return place->second;
+}
+
+Mesh Renderer::LoadMesh(const Geometry& geometry) {
+  std::string problem = "it is missing";
+  const std::string file = resources_.Find(geometry.mesh);
+  if (!file.empty()) {
+    try {
+      return LoadObj(file, geometry.size);
+    } catch (const std::runtime_error& error) {
+      problem = error.what();
+    }
+  }
+  warn_("mesh '" + geometry.mesh + "': " + problem + "; drawing a box");
+  Geometry box;
+  box.size.setValue(kFallbackSize, kFallbackSize, kFallbackSize);
+  return MakePrimitive(box, 1.0);
 }
 
 GLuint Renderer::Texture(const std::string& uri) {

@@ -47,7 +47,8 @@ struct TargetMask {
 class Renderer {
  public:
   /// `world` gives the light and the sky. A missing texture is reported to `warn` and drawn as a
-  /// magenta chequerboard. Throws std::runtime_error without OpenGL or with an unreadable mesh.
+  /// magenta chequerboard; a missing or unreadable mesh is reported likewise and drawn as a box of
+  /// 0.5 m. Throws std::runtime_error without OpenGL.
   Renderer(const StereoCamera& camera, const World& world, const Scene& scene,
            const Resources& resources, const WarningSink& warn);
   ~Renderer();
@@ -80,6 +81,7 @@ class Renderer {
   };
 
   size_t AddMesh(const Geometry& geometry, double texture_size);
+  Mesh LoadMesh(const Geometry& geometry);
   GLuint Texture(const std::string& uri);
   GLuint NeutralLightMap();
   void DrawEye(Eye eye, const btTransform& mount, const std::vector<btTransform>& frames);

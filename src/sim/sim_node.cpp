@@ -9,9 +9,17 @@ namespace {
 const ros::WallDuration kIdle(0.01);   // How long a paused loop sleeps.
 const ros::WallDuration kPoll(0.001);  // How long a waiting loop goes without serving services.
 constexpr double kCatchUp = 0.1;       // Lateness up to this is made up for, more is let go [s].
-constexpr double kSlipWarningPeriod = 5.0;  // [s]
+const ros::WallDuration kWarningPeriod(5.0);  // Of the same warning.
 
 void Warn(const std::string& message) { ROS_WARN_STREAM(message); }
+
+// Whether a warning last given at `last` may be given again now; if so, it counts as given.
+bool IsDue(ros::WallTime* last) {
+  const ros::WallTime now = ros::WallTime::now();
+  if (now - *last < kWarningPeriod) return false;
+  *last = now;
+  return true;
+}
 
 }  // namespace
 
@@ -81,9 +89,11 @@ bool SimNode::WaitsForCommands() {
     waiting_ = false;
   } else if ((ros::WallTime::now() - frame_published_).toSec() > parameters_.lockstep_timeout) {
     waiting_ = false;
-    ROS_WARN("lockstep: no %s answered frame %lu within %.1f s; going on without",
-             commanded_ ? "/husky/cmd_vel" : "/cmd_vel",
-             static_cast<unsigned long>(simulation_.frame()), parameters_.lockstep_timeout);
+    ROS_WARN(
+        "lockstep: no %s answered frame %lu within %.1f s; going on without. If it comes late, "
+        "it answers a later frame: this run is no longer reproducible",
+        commanded_ ? "/husky/cmd_vel" : "/cmd_vel", static_cast<unsigned long>(simulation_.frame()),
+        parameters_.lockstep_timeout);
   }
   return waiting_;
 }
@@ -97,8 +107,7 @@ double SimNode::SecondsAhead() {
   if (ahead > -kCatchUp) return ahead;
   anchor_time_ = simulation_.time();
   anchor_wall_ = now;
-  if ((now - last_slip_warning_).toSec() > kSlipWarningPeriod) {
-    last_slip_warning_ = now;
+  if (IsDue(&slip_warning_)) {
     ROS_WARN("slower than real time: %.0f ms late, real-time factor %.2f", -1e3 * ahead,
              publishers_.real_time_factor());
   }
@@ -113,19 +122,18 @@ void SimNode::RestartTime() {
 
 void SimNode::OnCommand(const geometry_msgs::Twist& twist) {
   commanded_ = true;
-  const btVector3 velocity(btScalar(twist.linear.x), btScalar(twist.linear.y),
-                           btScalar(twist.linear.z));
-  const bool finite = simulation_.spiri().Command(velocity, twist.angular.z, simulation_.time());
-  if (!finite && command_finite_) ROS_WARN("/cmd_vel is not finite; hovering");
-  command_finite_ = finite;
+  const bool finite = simulation_.spiri().Command({twist.linear.x, twist.linear.y, twist.linear.z},
+                                                  twist.angular.z, simulation_.time());
+  if (!finite && IsDue(&command_warning_)) ROS_WARN("/cmd_vel is not finite; hovering");
 }
 
 void SimNode::OnTargetCommand(const geometry_msgs::Twist& twist) {
   target_commanded_ = true;
   const bool finite =
       simulation_.husky().Command(twist.linear.x, twist.angular.z, simulation_.time());
-  if (!finite && target_command_finite_) ROS_WARN("/husky/cmd_vel is not finite; stopping");
-  target_command_finite_ = finite;
+  if (!finite && IsDue(&target_command_warning_)) {
+    ROS_WARN("/husky/cmd_vel is not finite; stopping");
+  }
 }
 
 bool SimNode::OnPause(Empty::Request&, Empty::Response&) {

@@ -57,11 +57,11 @@ class SimNode {
   // Lockstep: what has come since the last frame.
   bool waiting_ = false, commanded_ = false, target_commanded_ = false;
   ros::WallTime frame_published_;
-  // A row of commands that are not finite is one warning.
-  bool command_finite_ = true, target_command_finite_ = true;
   // Realtime: a moment of the simulation and the wall-clock time at which it is due.
   double anchor_time_ = 0;
-  ros::WallTime anchor_wall_, last_slip_warning_;
+  ros::WallTime anchor_wall_;
+  // When each warning was given last.
+  ros::WallTime slip_warning_, command_warning_, target_command_warning_;
 };
 
 }  // namespace tld_follower::sim

@@ -21,8 +21,12 @@ btVector3 ClipHorizontal(const btVector3& v, double limit) {
   return {v.x() * scale, v.y() * scale, v.z()};
 }
 
-bool IsFinite(const btVector3& v) {
-  return std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z());
+// Scaled down to the limit before anything is squared: a command may be as large as 1e300.
+btVector3 ClipVelocity(const std::array<double, 3>& v, double max_xy, double max_z) {
+  const double norm = std::hypot(v[0], v[1]);
+  const double scale = norm > max_xy ? max_xy / norm : 1.0;
+  return {btScalar(v[0] * scale), btScalar(v[1] * scale),
+          btScalar(std::clamp(v[2], -max_z, max_z))};
 }
 
 // Rotors in the order front left, rear left, rear right, front right; neighbours turn opposite.
@@ -54,16 +58,15 @@ Spiri::Spiri(const SpiriParameters& parameters, const Robot& robot, const btTran
   }
 }
 
-bool Spiri::Command(const btVector3& velocity, double yaw_rate, double time) {
-  if (!IsFinite(velocity) || !std::isfinite(yaw_rate)) {
+bool Spiri::Command(const std::array<double, 3>& velocity, double yaw_rate, double time) {
+  const auto finite = [](double v) { return std::isfinite(v); };
+  if (!std::all_of(velocity.begin(), velocity.end(), finite) || !finite(yaw_rate)) {
     command_.reset();
     return false;
   }
-  const double max_z = parameters_.max_speed_z;
   const double max_yaw = parameters_.max_yaw_rate;
   Setpoint setpoint;
-  setpoint.velocity = ClipHorizontal(velocity, parameters_.max_speed_xy);
-  setpoint.velocity.setZ(btScalar(std::clamp<double>(velocity.z(), -max_z, max_z)));
+  setpoint.velocity = ClipVelocity(velocity, parameters_.max_speed_xy, parameters_.max_speed_z);
   setpoint.yaw_rate = std::clamp(yaw_rate, -max_yaw, max_yaw);
   setpoint.time = time;
   command_ = setpoint;

@@ -56,7 +56,7 @@ class Spiri {
   /// A velocity in the drone's yaw frame (x forward, y left, z up) [m/s] and a yaw rate [rad/s],
   /// given at `time` [s]; obeyed after take-off. A command that is not finite makes the drone hover
   /// and returns false.
-  bool Command(const btVector3& velocity, double yaw_rate, double time);
+  bool Command(const std::array<double, 3>& velocity, double yaw_rate, double time);
 
   /// Sets the forces for the physics step that starts at `time` [s].
   void Actuate(double time);

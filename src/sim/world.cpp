@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/world.h"
 
+#include <console_bridge/console.h>
+
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <sdf/sdf.hh>
@@ -20,6 +23,11 @@ btTransform ToBullet(const ignition::math::Pose3d& pose) {
       ToBullet(pose.Pos()));
 }
 
+btTransform FinitePose(const ignition::math::Pose3d& pose, const std::string& what) {
+  if (!pose.IsFinite()) throw std::runtime_error("the pose of " + what + " is not finite");
+  return ToBullet(pose);
+}
+
 std::array<float, 3> ToRgb(const ignition::math::Color& c) { return {c.R(), c.G(), c.B()}; }
 
 // The place of an SDF object in the world: poses of frames given relative to others are resolved.
@@ -30,7 +38,17 @@ btTransform Resolve(const SdfObject& object, const std::string& what) {
   if (!errors.empty()) {
     throw std::runtime_error("the pose of " + what + " is wrong: " + errors.front().Message());
   }
-  return ToBullet(pose);
+  return FinitePose(pose, what);
+}
+
+void CheckSize(const Geometry& geometry, const std::string& owner) {
+  const btVector3& size = geometry.size;
+  const bool flat = geometry.type == Geometry::Type::kPlane;
+  for (const btScalar length : {size.x(), size.y(), flat ? size.x() : size.z()}) {
+    if (!(length > 0 && std::isfinite(length))) {
+      throw std::runtime_error("'" + owner + "' has a size or scale that is not positive");
+    }
+  }
 }
 
 Geometry ReadGeometry(const sdf::Geometry& geometry, const std::string& owner) {
@@ -68,6 +86,7 @@ Geometry ReadGeometry(const sdf::Geometry& geometry, const std::string& owner) {
       throw std::runtime_error("'" + owner +
                                "' has a geometry other than box, cylinder, sphere, plane or mesh");
   }
+  CheckSize(result, owner);
   return result;
 }
 
@@ -84,7 +103,7 @@ Material ReadMaterial(const sdf::Material* material) {
   }
   if (material->Element()->HasElement("tld:texture_size")) {
     result.texture_size = material->Element()->GetElement("tld:texture_size")->Get<double>();
-    if (!(result.texture_size > 0)) {
+    if (!(result.texture_size > 0 && std::isfinite(result.texture_size))) {
       throw std::runtime_error("<tld:texture_size> must be positive");
     }
   }
@@ -98,7 +117,11 @@ double ReadFriction(const sdf::Collision& collision) {
     if (!element->HasElement(name)) return 1.0;
     element = element->GetElement(name);
   }
-  return element->Get<double>();
+  const double friction = element->Get<double>();
+  if (!(friction >= 0 && std::isfinite(friction))) {
+    throw std::runtime_error("the friction of '" + collision.Name() + "' must be 0 or more");
+  }
+  return friction;
 }
 
 StaticModel ReadModel(const sdf::Model& model, const WarningSink& warn) {
@@ -159,7 +182,8 @@ const RobotPlacement& World::Robot(const std::string& robot) const {
   for (const RobotPlacement& placement : robots) {
     if (placement.name == robot) return placement;
   }
-  throw std::runtime_error("world '" + name + "' does not <include> a robot named '" + robot + "'");
+  throw std::runtime_error("the world '" + file + "' does not <include> a robot named '" + robot +
+                           "'");
 }
 
 World LoadWorld(const std::string& file, const Resources& resources, const WarningSink& warn) {
@@ -168,10 +192,16 @@ World LoadWorld(const std::string& file, const Resources& resources, const Warni
     throw std::runtime_error("cannot read the world '" + file + "': no such file");
   }
   sdf::Console::Instance()->SetQuiet(true);  // What it has to say comes back as errors.
+  // What is no valid SDF it tries as URDF, whose parser would complain of that on the console.
+  console_bridge::noOutputHandler();
   sdf::Root root;
   const sdf::Errors errors = root.Load(file, MakeParser(resources));
+  console_bridge::restorePreviousOutputHandler();
   if (!errors.empty()) {
-    throw std::runtime_error("cannot read the world '" + file + "': " + errors.front().Message());
+    const auto line = errors.front().LineNumber();
+    throw std::runtime_error("cannot read the world '" + file + "'" +
+                             (line ? ", line " + std::to_string(*line) : "") + ": " +
+                             errors.front().Message());
   }
   if (root.WorldCount() == 0) {
     throw std::runtime_error("cannot read the world '" + file + "': it has no <world>");
@@ -179,7 +209,9 @@ World LoadWorld(const std::string& file, const Resources& resources, const Warni
   const sdf::World& source = *root.WorldByIndex(0);
   try {
     World world;
+    world.file = file;
     world.name = source.Name();
+    if (!source.Gravity().IsFinite()) throw std::runtime_error("its gravity is not finite");
     world.gravity = ToBullet(source.Gravity());
     if (source.Scene() != nullptr) world.ambient = ToRgb(source.Scene()->Ambient());
     if (source.Element()->HasElement("tld:sky")) {
@@ -188,6 +220,10 @@ World LoadWorld(const std::string& file, const Resources& resources, const Warni
     for (uint64_t i = 0; i < source.LightCount(); ++i) {
       const sdf::Light& light = *source.LightByIndex(i);
       if (light.Type() != sdf::LightType::DIRECTIONAL) continue;
+      const double length = light.Direction().Length();
+      if (!(length > 0 && std::isfinite(length))) {
+        throw std::runtime_error("light '" + light.Name() + "' has no direction");
+      }
       world.sun_direction = ToBullet(light.Direction()).normalized();
       world.sun_colour = ToRgb(light.Diffuse());
     }
@@ -196,9 +232,10 @@ World LoadWorld(const std::string& file, const Resources& resources, const Warni
     }
     for (uint64_t i = 0; i < source.InterfaceModelCount(); ++i) {
       const sdf::NestedInclude& include = *source.InterfaceModelNestedIncludeByIndex(i);
+      const std::string& name = source.InterfaceModelByIndex(i)->Name();
       world.robots.push_back(
-          {source.InterfaceModelByIndex(i)->Name(), include.ResolvedFileName(),
-           ToBullet(include.IncludeRawPose().value_or(ignition::math::Pose3d::Zero))});
+          {name, include.ResolvedFileName(),
+           FinitePose(include.IncludeRawPose().value_or(ignition::math::Pose3d::Zero), name)});
     }
     return world;
   } catch (const std::runtime_error& problem) {

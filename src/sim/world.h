@@ -26,6 +26,7 @@ struct RobotPlacement {
 
 /// A world as read from an SDF file. World frame: z up.
 struct World {
+  std::string file;
   std::string name;
   btVector3 gravity{0, 0, btScalar(-9.81)};           ///< [m/s^2]
   btVector3 sun_direction{0, 0, -1};                  ///< Unit vector along the light's rays.
@@ -45,7 +46,8 @@ struct World {
 /// of one texture repeat [m]; `<tld:sky>` in the `<world>` names the texture of the sky dome.
 /// `<pbr><metal><light_map>` is stretched once over a plane and breaks up the repeats.
 ///
-/// Throws std::runtime_error with one readable sentence if the file cannot be read or is no world.
+/// Throws std::runtime_error with one readable sentence that names the file if it cannot be read,
+/// is no world, or has a number that cannot be meant: not finite, or a size that is not positive.
 World LoadWorld(const std::string& file, const Resources& resources, const WarningSink& warn);
 
 }  // namespace tld_follower::sim

@@ -14,10 +14,12 @@ struct EncodingTraits {
   int channels;
   int to_grey, to_bgr;  // cv::ColorConversionCodes; -1 if there is nothing to convert.
 };
-constexpr std::array<EncodingTraits, 7> kTraits{{
+constexpr std::array<EncodingTraits, 9> kTraits{{
     {"mono8", 1, -1, -1},
     {"bgr8", 3, cv::COLOR_BGR2GRAY, -1},
     {"rgb8", 3, cv::COLOR_RGB2GRAY, -1},
+    {"bgra8", 4, cv::COLOR_BGRA2GRAY, cv::COLOR_BGRA2BGR},
+    {"rgba8", 4, cv::COLOR_RGBA2GRAY, cv::COLOR_RGBA2BGR},
     {"bayer_rggb8", 1, cv::COLOR_BayerBG2GRAY, cv::COLOR_BayerBG2BGR},
     {"bayer_bggr8", 1, cv::COLOR_BayerRG2GRAY, cv::COLOR_BayerRG2BGR},
     {"bayer_gbrg8", 1, cv::COLOR_BayerGR2GRAY, cv::COLOR_BayerGR2BGR},
@@ -35,11 +37,14 @@ cv::Mat Convert(const cv::Mat& raw, int code, cv::Mat* buffer) {
 }  // namespace
 
 Encoding ParseEncoding(const std::string& name) {
+  if (name == "8UC1") return Encoding::kMono;
+  if (name == "8UC3") return Encoding::kBgr;
   for (size_t i = 0; i < kTraits.size(); ++i) {
     if (name == kTraits[i].name) return static_cast<Encoding>(i);
   }
   throw std::invalid_argument("image encoding '" + name +
-                              "' is not one of mono8, bgr8, rgb8, bayer_{rggb,bggr,gbrg,grbg}8");
+                              "' is not one of mono8, 8UC1, bgr8, 8UC3, rgb8, bgra8, rgba8, "
+                              "bayer_{rggb,bggr,gbrg,grbg}8");
 }
 
 int Channels(Encoding encoding) { return Traits(encoding).channels; }

@@ -7,10 +7,20 @@
 
 namespace tld_follower::stereo {
 
-enum class Encoding { kMono, kBgr, kRgb, kBayerRggb, kBayerBggr, kBayerGbrg, kBayerGrbg };
+enum class Encoding {
+  kMono,
+  kBgr,
+  kRgb,
+  kBgra,
+  kRgba,
+  kBayerRggb,
+  kBayerBggr,
+  kBayerGbrg,
+  kBayerGrbg
+};
 
-/// Reads a ROS encoding: mono8, bgr8, rgb8 or bayer_{rggb,bggr,gbrg,grbg}8. Throws
-/// std::invalid_argument for any other.
+/// Reads a ROS encoding: mono8, bgr8, rgb8, bgra8, rgba8 or bayer_{rggb,bggr,gbrg,grbg}8; 8UC1 and
+/// 8UC3 are read as mono8 and bgr8. Throws std::invalid_argument for any other.
 Encoding ParseEncoding(const std::string& name);
 
 /// Bytes of one raw pixel.
@@ -25,7 +35,8 @@ struct Texture {
   bool red_first = false;
 };
 
-/// Colours of a raw image. Shares its pixels unless a Bayer pattern must be unfolded into `buffer`.
+/// Colours of a raw image. Shares its pixels unless a Bayer pattern must be unfolded into `buffer`
+/// or an alpha channel left out there.
 Texture ToTexture(const cv::Mat& raw, Encoding encoding, cv::Mat* buffer);
 
 }  // namespace tld_follower::stereo

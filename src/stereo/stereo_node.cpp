@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <boost/bind/bind.hpp>
 #include <exception>
+#include <map>
 #include <opencv2/core/utility.hpp>
+#include <sstream>
 #include <stdexcept>
 
 namespace tld_follower::stereo {
@@ -17,6 +19,7 @@ namespace {
 
 using sensor_msgs::CameraInfo;
 using sensor_msgs::Image;
+using XmlRpc::XmlRpcValue;
 constexpr double kCheckPeriod = 5;  // [s of wall-clock time]
 constexpr std::chrono::seconds kSameWarningPeriod{10};
 constexpr uint32_t kNewestOnly = 1;  // A queue of more would only make pairs older under load.
@@ -70,6 +73,54 @@ MatcherParameters ToParameters(const tld_follower::StereoConfig& config) {
   return parameters;
 }
 
+[[noreturn]] void Fail(const std::string& name, const std::string& what) {
+  throw std::invalid_argument("parameter ~" + name + " must be " + what);
+}
+
+// `type` is what T is called in XML-RPC: roscpp itself takes a fraction as a whole number.
+template <typename T>
+T ReadParameter(const ros::NodeHandle& handle, const std::string& name, const std::string& what,
+                XmlRpcValue::Type type, const T& fallback) {
+  XmlRpcValue value;
+  if (!handle.getParam(name, value)) return fallback;
+  if (value.getType() != type) Fail(name, what);
+  return static_cast<T&>(value);
+}
+
+int ReadQueueSize(const ros::NodeHandle& handle) {
+  const std::string what = "a whole number, 1 or more";
+  const int size = ReadParameter(handle, "queue_size", what, XmlRpcValue::TypeInt, 5);
+  if (size < 1) Fail("queue_size", what);
+  return size;
+}
+
+std::string ReadTransport(const ros::NodeHandle& handle,
+                          const image_transport::ImageTransport& transport) {
+  const std::string plugins = "image_transport/";
+  std::string names;
+  const auto name = ReadParameter<std::string>(
+      handle, "image_transport", "the name of an image transport", XmlRpcValue::TypeString, "raw");
+  for (const std::string& plugin : transport.getLoadableTransports()) {
+    if (plugin == plugins + name) return name;
+    names += (names.empty() ? "" : ", ") + plugin.substr(plugins.size());
+  }
+  Fail("image_transport",
+       "one of the transports installed here (" + names + "), not '" + name + "'");
+}
+
+bool IsNumber(const XmlRpcValue& value) {
+  return value.getType() == XmlRpcValue::TypeInt || value.getType() == XmlRpcValue::TypeDouble;
+}
+
+double ToNumber(XmlRpcValue value) {
+  return value.getType() == XmlRpcValue::TypeInt ? static_cast<int&>(value)
+                                                 : static_cast<double&>(value);
+}
+
+bool AreEqual(const XmlRpcValue& a, const XmlRpcValue& b) {
+  return IsNumber(a) && IsNumber(b) ? ToNumber(a) == ToNumber(b) : a == b;
+}
+
 std::string Joined(const std::vector<std::string>& names) {
   std::string text;
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
@@ -81,10 +132,11 @@ std::string Joined(const std::vector<std::string>& names) {
 StereoNode::StereoNode(ros::NodeHandle handle, ros::NodeHandle private_handle)
     : handle_(handle),
       transport_(handle),
-      hints_("raw", ros::TransportHints().tcpNoDelay(), private_handle),
-      queue_size_(std::max(1, private_handle.param("queue_size", 5))),
-      approximate_sync_(private_handle.param("approximate_sync", false)),
-      reconfigure_server_(private_handle) {
+      hints_(ReadTransport(private_handle, transport_), ros::TransportHints().tcpNoDelay(),
+             private_handle),
+      queue_size_(ReadQueueSize(private_handle)),
+      approximate_sync_(ReadParameter(private_handle, "approximate_sync", "true or false",
+                                      XmlRpcValue::TypeBoolean, false)) {
   MakeSynchroniser();
   images_[0].registerCallback([this](const ros::MessageEvent<const Image>& m) { OnMessage<0>(m); });
   infos_[0].registerCallback(
@@ -93,8 +145,7 @@ StereoNode::StereoNode(ros::NodeHandle handle, ros::NodeHandle private_handle)
   infos_[1].registerCallback(
       [this](const ros::MessageEvent<const CameraInfo>& m) { OnMessage<3>(m); });
 
-  reconfigure_server_.setCallback(
-      [this](tld_follower::StereoConfig& config, uint32_t) { OnReconfigure(&config); });
+  StartReconfigure(private_handle);
   const auto changed = [this](const ros::SingleSubscriberPublisher&) { SubscribeWhileNeeded(); };
   disparity_publisher_ =
       handle_.advertise<stereo_msgs::DisparityImage>("disparity", kNewestOnly, changed, changed);
@@ -102,6 +153,30 @@ StereoNode::StereoNode(ros::NodeHandle handle, ros::NodeHandle private_handle)
       handle_.advertise<sensor_msgs::PointCloud2>("points2", kNewestOnly, changed, changed);
   input_timer_ = handle_.createWallTimer(ros::WallDuration(kCheckPeriod),
                                          [this](const ros::WallTimerEvent&) { CheckInputs(); });
+}
+
+// The server silently puts what is in force in the place of values that are out of range or of a
+// wrong type; whoever set them is told.
+void StereoNode::StartReconfigure(const ros::NodeHandle& private_handle) {
+  std::map<std::string, XmlRpcValue> asked;
+  for (const auto& description : tld_follower::StereoConfig::__getParamDescriptions__()) {
+    XmlRpcValue value;
+    if (private_handle.getParam(description->name, value)) asked[description->name] = value;
+  }
+  reconfigure_server_.emplace(private_handle);
+  reconfigure_server_->setCallback(
+      [this](tld_follower::StereoConfig& config, uint32_t) { OnReconfigure(&config); });
+  std::ostringstream changes;
+  for (auto& [name, value] : asked) {
+    XmlRpcValue in_force;
+    private_handle.getParam(name, in_force);
+    if (AreEqual(value, in_force)) continue;
+    changes << (changes.tellp() > 0 ? ", " : "") << "~" << name << " " << in_force << " for "
+            << value;
+  }
+  if (changes.tellp() > 0) {
+    ROS_WARN_STREAM("parameters out of range or of a wrong type; in force are " << changes.str());
+  }
 }
 
 void StereoNode::MakeSynchroniser() {
@@ -284,6 +359,13 @@ int main(int argc, char** argv) {
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, 128 << 20);
   cv::setNumThreads(1);  // The machine's other cores belong to the other nodes.
-  tld_follower::stereo::StereoNode node(ros::NodeHandle(), ros::NodeHandle("~"));
-  ros::spin();
+  ros::start();          // Or the end of the node's last handle would silence the message below.
+  try {
+    tld_follower::stereo::StereoNode node(ros::NodeHandle(), ros::NodeHandle("~"));
+    ros::spin();
+  } catch (const std::exception& problem) {
+    ROS_FATAL("%s", problem.what());
+    return 1;
+  }
+  return 0;
 }

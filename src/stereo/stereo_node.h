@@ -18,6 +18,7 @@
 #include <array>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 
@@ -34,6 +35,8 @@ namespace tld_follower::stereo {
 class StereoNode {
  public:
   /// Topics are relative to `handle`, parameters private to `private_handle`.
+  /// Throws std::invalid_argument naming the parameter if one that cannot change has a wrong type
+  /// or value.
   StereoNode(ros::NodeHandle handle, ros::NodeHandle private_handle);
 
  private:
@@ -65,6 +68,7 @@ class StereoNode {
     cv::Mat grey_, texture_;
   };
 
+  void StartReconfigure(const ros::NodeHandle& private_handle);
   void MakeSynchroniser();
   template <int kInput, typename Message>
   void OnMessage(const ros::MessageEvent<const Message>& event);
@@ -106,7 +110,7 @@ class StereoNode {
   std::chrono::steady_clock::time_point last_warning_time_;
 
   ros::Publisher disparity_publisher_, cloud_publisher_;
-  dynamic_reconfigure::Server<tld_follower::StereoConfig> reconfigure_server_;
+  std::optional<dynamic_reconfigure::Server<tld_follower::StereoConfig>> reconfigure_server_;
   ros::WallTimer input_timer_;
 };
 

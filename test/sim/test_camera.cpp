@@ -140,6 +140,31 @@ TEST(Camera, MissingTextureIsOneWarningAndAMagentaPattern) {
   EXPECT_GT(magenta, 500);
 }
 
+TEST(Camera, MissingAndBrokenMeshesAreWarningsAndBoxes) {
+  const TemporaryFile broken("broken.obj", "f 1/1/1 2/1/1 3/1/1\n");
+  Warnings warnings;
+  Scene scene{{Ball({2, 0, 0}, 1), Ball({2, 0, 0}, 1), Ball({2, 1, 0}, 1)}, {}};
+  for (SceneNode& node : scene.visuals) {
+    node.visual.geometry.type = Geometry::Type::kMesh;
+    node.visual.geometry.mesh = "media/no_such.obj";
+    node.target = true;
+  }
+  scene.visuals[2].visual.geometry.mesh = broken.path();
+  scene.visuals[2].target = false;
+  StereoCamera camera;
+  camera.pitch = 0;
+  camera.position.setValue(0, 0, 0);
+  const Resources resources({std::filesystem::temp_directory_path().string()});
+  Renderer renderer(camera, BrightWorld(), scene, resources, warnings.Sink());
+  StereoImages images;
+  TargetMask mask;
+  renderer.Render(btTransform::getIdentity(), {}, &images, &mask);
+  ASSERT_EQ(warnings.lines.size(), 2u);
+  EXPECT_NE(warnings.lines[0].find("no_such.obj"), std::string::npos);
+  EXPECT_NE(warnings.lines[1].find("broken.obj"), std::string::npos);
+  EXPECT_NEAR(mask.width, camera.FocalLength() * 0.5 / 1.75, 3);
+}
+
 TEST(Camera, UnusableSizesAndMeshesAreErrors) {
   StereoCamera camera;
   camera.width = 0;

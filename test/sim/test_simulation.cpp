@@ -22,7 +22,7 @@ std::vector<uint8_t> Record(Simulation* simulation) {
   while (simulation->frame() < 150) {
     if (!simulation->Advance().frame) continue;
     const double wave = std::sin(double(simulation->frame()) * 0.1);
-    simulation->spiri().Command({btScalar(0.8 * wave), 0, 0}, 0.3 * wave, simulation->time());
+    simulation->spiri().Command({0.8 * wave, 0, 0}, 0.3 * wave, simulation->time());
     simulation->husky().Command(0.7, 0.5 * wave, simulation->time());
     if (simulation->frame() % 30 == 0) {
       simulation->Render(&images, nullptr);
@@ -160,6 +160,38 @@ TEST(World, ProblemsAreOneClearSentence) {
       "<sdf version='1.6'><world name='w'><include><uri>model://no_robot.urdf</uri></include>"
       "</world></sdf>");
   EXPECT_NE(ErrorOf(unknown.path()).find("no_robot"), std::string::npos);
+}
+
+// A world of one box, and what is wrong in it.
+std::string BoxWorld(const std::string& gravity, const std::string& pose, const std::string& size) {
+  return "<sdf version='1.6'><world name='w'><gravity>" + gravity +
+         "</gravity><model name='m'><static>true</static><pose>" + pose +
+         "</pose><link name='l'><collision name='c'><geometry><box><size>" + size +
+         "</size></box></geometry></collision></link></model></world></sdf>";
+}
+
+TEST(World, NumbersThatCannotBeMeantAreOneSentenceThatNamesTheFile) {
+  const std::string down = "0 0 -9.81", origin = "0 0 0 0 0 0", cube = "1 1 1";
+  const std::pair<const char*, std::string> cases[] = {
+      {"include", BoxWorld(down, origin, cube)},  // Nothing but the robots is missing.
+      {"gravity", BoxWorld("0 0 nan", origin, cube)},
+      {"gravity", BoxWorld("0 0", origin, cube)},
+      {"pose", BoxWorld(down, "0 nan 0 0 0 0", cube)},
+      {"pose", BoxWorld(down, "0 0 0 0 inf 0", cube)},
+      {"pose", BoxWorld(down, "0 0 0", cube)},
+      {"size", BoxWorld(down, origin, "1 nan 1")},
+      {"size", BoxWorld(down, origin, "1 1")},
+      {"size", BoxWorld(down, origin, "1 0 1")},
+      {"size", BoxWorld(down, origin, "1 -1 1")},
+  };
+  for (const auto& [word, text] : cases) {
+    const TemporaryFile file("numbers.world", text);
+    testing::internal::CaptureStderr();
+    const std::string error = ErrorOf(file.path());
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << text;
+    EXPECT_NE(error.find(file.path()), std::string::npos) << text << ": " << error;
+    EXPECT_NE(error.find(word), std::string::npos) << text << ": " << error;
+  }
 }
 
 TEST(World, ReadsPosesMaterialsAndRobots) {

@@ -10,9 +10,10 @@ import unittest
 import numpy as np
 import rospy
 import rostest
+import yaml
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from rosgraph_msgs.msg import Clock
+from rosgraph_msgs.msg import Clock, Log
 from sensor_msgs.msg import CameraInfo, Image, Imu, JointState, Range
 from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
@@ -207,13 +208,41 @@ class SimulatorNodeTest(unittest.TestCase):
         self.assertAlmostEqual(truth.drone_pose.position.z, 0.65, delta=0.02)
         self.assertAlmostEqual(truth.distance, 1.0, delta=0.02)
 
-    def test_unreadable_world_is_one_message_and_a_failure(self):
-        command = ["rosrun", "tld_follower", "bullet_sim", "__name:=other", "_world:=/no/such.world"]
-        run = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
-        self.assertNotEqual(run.returncode, 0)
-        lines = [line for line in (run.stdout + run.stderr).splitlines() if "[" in line]
-        self.assertEqual(len(lines), 1, lines)
-        self.assertIn("/no/such.world", lines[0])
+    def test_bad_commands_in_between_are_one_warning(self):
+        bad = Twist()
+        bad.linear.x = float("nan")
+        huge = Twist()
+        huge.linear.z = -1e300  # Absurd, but a number.
+        log = []
+        listener = rospy.Subscriber("/rosout", Log, log.append)
+        wait_for(lambda: listener.get_num_connections() >= 2, "log connected")
+        time.sleep(5.1)  # Earlier warnings do not count any more.
+        type(self).answer = lambda image: bad if image.header.stamp.nsecs % 4_000_000 else huge
+        self.step(60)
+        wait_for(lambda: any("cmd_vel" in m.msg for m in log), "the warning")
+        self.assertEqual([m.msg for m in log if "cmd_vel" in m.msg], ["/cmd_vel is not finite; hovering"])
+        listener.unregister()
+
+    def test_bad_parameters_are_one_message_and_a_failure(self):
+        for name, value in {
+            "world": "/no/such.world",
+            "camera_position": "[.nan, 0, 0]",
+            "spiri/max_tilt": "1.6",
+            "spiri_pose": "[20000.0, 0.0, 0.0]",
+            "husky_pose": "[0.0, .inf, 0.0]",
+            "seed": "-1",
+            "width": "640.5",
+        }.items():
+            with self.subTest(name):
+                rospy.set_param("/other", {"world": "/no/such.world"})
+                rospy.set_param(f"/other/{name}", yaml.safe_load(value))
+                command = ["rosrun", "tld_follower", "bullet_sim", "__name:=other"]
+                run = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+                self.assertEqual(run.returncode, 1)
+                lines = [line for line in (run.stdout + run.stderr).splitlines() if "[" in line]
+                self.assertEqual(len(lines), 1, lines)
+                self.assertIn("/no/such.world" if name == "world" else f"~{name}", lines[0])
+        rospy.delete_param("/other")
 
 
 if __name__ == "__main__":

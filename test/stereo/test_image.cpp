@@ -15,7 +15,10 @@ constexpr int kGreyLevel = 141;  // 0.114 * 40 + 0.587 * 120 + 0.299 * 220
 TEST(Image, KnowsTheEncodingsOfTheContractOnly) {
   EXPECT_EQ(Channels(ParseEncoding("mono8")), 1);
   EXPECT_EQ(Channels(ParseEncoding("bgr8")), 3);
+  EXPECT_EQ(Channels(ParseEncoding("rgba8")), 4);
   EXPECT_EQ(Channels(ParseEncoding("bayer_grbg8")), 1);
+  EXPECT_EQ(ParseEncoding("8UC1"), Encoding::kMono);
+  EXPECT_EQ(ParseEncoding("8UC3"), Encoding::kBgr);
   for (const char* name : {"", "mono16", "32FC1", "MONO8", "bayer_rggb16"}) {
     EXPECT_THROW(ParseEncoding(name), std::invalid_argument) << name;
   }
@@ -38,6 +41,20 @@ TEST(Image, TextureSharesColourAndSaysItsOrder) {
   EXPECT_EQ(rgb.pixels.data, pixels.data);
   EXPECT_TRUE(rgb.red_first);
   EXPECT_FALSE(ToTexture(pixels, Encoding::kBgr, &buffer).red_first);
+}
+
+TEST(Image, AlphaIsLeftOut) {
+  cv::Mat buffer;
+  for (const std::string name : {"bgra8", "rgba8"}) {
+    const cv::Scalar pixel(kBgr[name == "bgra8" ? 0 : 2], kBgr[1], kBgr[name == "bgra8" ? 2 : 0],
+                           9);
+    const cv::Mat raw(4, 6, CV_8UC4, pixel);
+    const Encoding encoding = ParseEncoding(name);
+    EXPECT_EQ(ToGrey(raw, encoding, &buffer).at<uchar>(2, 3), kGreyLevel) << name;
+    const Texture texture = ToTexture(raw, encoding, &buffer);
+    EXPECT_EQ(texture.pixels.at<cv::Vec3b>(2, 3), kBgr) << name;
+    EXPECT_FALSE(texture.red_first);
+  }
 }
 
 TEST(Image, EveryBayerPatternGivesItsColourBack) {
