@@ -12,6 +12,7 @@ from tld_follower.following.parameters import Parameters
 from tld_follower.msg import BoundingBoxStamped, FollowState
 from tld_follower.nodes.conversions import cloud_points, message_box
 from tld_follower.nodes.newest import Newest
+from tld_follower.nodes.settings import fatal_if_wrong
 
 _UNKNOWN_VELOCITY = Vector3(math.nan, math.nan, math.nan)
 
@@ -147,9 +148,6 @@ class FollowerNode:
 def main():
     """Run the node until ROS shuts down."""
     rospy.init_node("pointsdepthA")
-    try:
+    with fatal_if_wrong():
         node = FollowerNode()
-    except ValueError as error:
-        rospy.logfatal(str(error))
-        raise SystemExit(1) from error
     node.run()

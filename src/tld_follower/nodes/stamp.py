@@ -3,7 +3,7 @@
 import rospy
 
 from tld_follower.msg import BoundingBox, BoundingBoxStamped
-from tld_follower.nodes.settings import checked
+from tld_follower.nodes.settings import checked, fatal_if_wrong
 
 
 class StampNode:
@@ -24,9 +24,6 @@ class StampNode:
 def main():
     """Run the node until ROS shuts down."""
     rospy.init_node("stamp")
-    try:
+    with fatal_if_wrong():
         StampNode()
-    except ValueError as error:
-        rospy.logfatal(str(error))
-        raise SystemExit(1) from error
     rospy.spin()

@@ -11,7 +11,7 @@ import tty
 import rospy
 from geometry_msgs.msg import Twist
 
-from tld_follower.nodes.settings import checked
+from tld_follower.nodes.settings import checked, fatal_if_wrong
 
 # key -> (forward, turn left), in units of the speed and the turn rate
 MOVES = {
@@ -91,16 +91,13 @@ def main():
     rospy.init_node("teleop_twist_keyboard")
     publisher = rospy.Publisher("/husky/cmd_vel", Twist, queue_size=1)
     defaults = {"speed": 1.0, "turn": 1.0, "max_speed": 1.0, "max_turn": 2.0}
-    try:
+    with fatal_if_wrong():
         keyboard = Keyboard(
             **{
                 name: checked(rospy.get_param(f"~{name}", value), name, float, lambda x: 0 < x < math.inf)
                 for name, value in defaults.items()
             }
         )
-    except ValueError as error:
-        rospy.logfatal(str(error))
-        raise SystemExit(1) from error
     if sys.stdin is None or not sys.stdin.isatty():
         rospy.loginfo(
             "no terminal to read keys from: staying idle; run 'rosrun tld_follower teleop_twist_keyboard'"

@@ -10,7 +10,7 @@ from tld_follower.box import Box
 from tld_follower.msg import BoundingBox
 from tld_follower.nodes.conversions import box_message, grey_image, image_array
 from tld_follower.nodes.newest import Newest
-from tld_follower.nodes.settings import checked
+from tld_follower.nodes.settings import checked, fatal_if_wrong
 from tld_follower.tld.parameters import Parameters
 from tld_follower.tld.tracker import Tracker, warm_up
 
@@ -144,9 +144,6 @@ def main():
     """Run the node until ROS shuts down."""
     cv2.setNumThreads(1)  # the other cores belong to the other nodes
     rospy.init_node("NODE")
-    try:
+    with fatal_if_wrong():
         node = TrackerNode()
-    except ValueError as error:
-        rospy.logfatal(str(error))
-        raise SystemExit(1) from error
     node.run()
