@@ -61,6 +61,9 @@ def parse_arguments(argv):
         "--max-speed", type=_number(float, 0.01, "a positive number"), default=1.5, metavar="M/S"
     )
     parser.add_argument("--tracker", choices=("tld", "tld_sift"), default="tld")
+    parser.add_argument(
+        "--use-depth", action="store_true", help="the tracker takes the cloud as well (default: images alone)"
+    )
     parser.add_argument("--resolution", type=_resolution, default="640x480", metavar="WxH")
     parser.add_argument("--world", type=Path, metavar="FILE", help="SDF world (default: the testing grounds)")
     parser.add_argument(
@@ -92,6 +95,7 @@ def launch_arguments(settings, scenario, seed):
         "control": settings.control,
         "max_speed": settings.max_speed,
         "tracker": settings.tracker,
+        "use_depth": str(settings.use_depth).lower(),
     }
     if settings.world:
         arguments["world"] = settings.world.resolve()
@@ -112,7 +116,7 @@ def fly(settings, seed, logs, video_path):
         log = logs / f"{scenario.name}-{seed}.log"
         arguments = launch_arguments(settings, scenario, seed)
         alive = stack.enter_context(graph.launched("follow.launch", arguments, log))
-        flight.wait_until_connected(alive)
+        flight.wait_until_connected(alive, settings.use_depth)
         trace, real_time_factor = flight.fly(scenario, alive)
     figures = flight_figures(trace, scenario.halt - scenario.start)
     return {"seed": seed, **figures, "real_time_factor": real_time_factor, "trace": trace}
@@ -170,6 +174,7 @@ def main(argv=None):
         "control": settings.control,
         "max_speed": settings.max_speed,
         "tracker": settings.tracker,
+        "use_depth": settings.use_depth,
         "resolution": settings.resolution,
         "world": str(settings.world.name) if settings.world else "testing_grounds.world",
         "image_noise": settings.image_noise,

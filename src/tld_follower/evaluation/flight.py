@@ -9,7 +9,7 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Image, RegionOfInterest
 from std_srvs.srv import Empty
 
-from tld_follower.evaluation.graph import FLYING_EDGES, GraphError, wait_for_edges
+from tld_follower.evaluation.graph import DEPTH_EDGE, FLYING_EDGES, GraphError, wait_for_edges
 from tld_follower.msg import BoundingBox, FollowState, Truth
 from tld_follower.nodes.conversions import message_box
 
@@ -62,12 +62,14 @@ class Flight:
             self._targets += 1
             self._changed.notify_all()
 
-    def wait_until_connected(self, alive=lambda: None):
-        """Wait for every edge of the graph, and for this flight's own."""
+    def wait_until_connected(self, alive=lambda: None, use_depth=False):
+        """Wait for every edge of the graph, the tracker's clouds with `use_depth`, and this flight's own."""
         me = rospy.get_name()
         sources = {"truth": "/gazebo", "box": "/NODE", "state": "/pointsdepthA", "image": "/gazebo"}
         own = {(sources[kind], topic, me) for kind, topic in self._topics.items()}
         own |= {(me, "/husky/cmd_vel", "/gazebo"), (me, "/NODE/init", "/NODE"), ("/NODE", "/NODE/target", me)}
+        if use_depth:
+            own.add(DEPTH_EDGE)
         wait_for_edges(FLYING_EDGES | own, alive=alive)
 
     def fly(self, scenario, alive=lambda: None):

@@ -29,6 +29,8 @@ FLYING_EDGES = frozenset(
     }
     | {("/gazebo", topic, "/stereo/stereo_image_proc") for topic in _CAMERAS}
 )
+# The one more with use_depth.
+DEPTH_EDGE = ("/stereo/stereo_image_proc", "/stereo/points2", "/NODE")
 
 
 class GraphError(RuntimeError):

@@ -1,7 +1,6 @@
 """/pointsdepthA: one velocity command for every box, from the box and the cloud of the same image."""
 
 import math
-import threading
 
 import rospy
 from geometry_msgs.msg import Twist, Vector3
@@ -10,6 +9,7 @@ from sensor_msgs.msg import PointCloud2
 from tld_follower.following.follower import Follower
 from tld_follower.following.parameters import Parameters
 from tld_follower.msg import BoundingBoxStamped, FollowState
+from tld_follower.nodes.clouds import Clouds
 from tld_follower.nodes.conversions import cloud_points, message_box
 from tld_follower.nodes.newest import Newest
 from tld_follower.nodes.settings import fatal_if_wrong
@@ -34,27 +34,15 @@ class FollowerNode:
         self._parameters = Parameters.from_dict(rospy.get_param("~", {}))
         self._follower = Follower(self._parameters)
         self._boxes = Newest()
-        self._clouds = threading.Condition()
-        self._recent = {}  # stamp -> cloud, in order of arrival
+        self._clouds = Clouds(self._parameters.max_age)
         self._stamp = rospy.Time()
         self._mode = None
         self._starved = False
 
         self._command = rospy.Publisher("/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
         self._state = rospy.Publisher("~state", FollowState, queue_size=10, tcp_nodelay=True)
-        rospy.Subscriber("/stereo/points2", PointCloud2, self._take_cloud, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("/stereo/points2", PointCloud2, self._clouds.put, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("/pointstampA", BoundingBoxStamped, self._boxes.put, queue_size=1, tcp_nodelay=True)
-
-    def _take_cloud(self, message):
-        stamp = message.header.stamp
-        with self._clouds:
-            self._recent = {
-                at: cloud
-                for at, cloud in self._recent.items()
-                if 0 < (stamp - at).to_sec() < self._parameters.max_age
-            }
-            self._recent[stamp] = message
-            self._clouds.notify_all()
 
     def run(self):
         """Process boxes until ROS shuts down; the drone then hovers by its own command timeout."""
@@ -79,10 +67,9 @@ class FollowerNode:
         if stamp < self._stamp:
             rospy.logwarn("time jumped back by %.3f s; starting afresh", (self._stamp - stamp).to_sec())
             self._follower = Follower(self._parameters)
-            with self._clouds:
-                self._recent = {at: cloud for at, cloud in self._recent.items() if at <= stamp}
         self._stamp = stamp
-        cloud = self._paired_cloud(stamp)
+        cloud = self._clouds.wait(stamp, self._parameters.cloud_wait, lambda: self._boxes.waiting)
+        cloud = cloud or self._clouds.newest
         now = rospy.Time.now()
         points, cloud_age = None, math.inf
         if cloud is not None:
@@ -94,23 +81,6 @@ class FollowerNode:
             box = None
         state = self._follower.update(box, message.box.target, (now - stamp).to_sec(), points, cloud_age)
         self._publish(message.header, state)
-
-    def _paired_cloud(self, stamp):
-        """Return the cloud of this stamp; the newest one if it will not come in time."""
-        deadline = rospy.Time.now() + rospy.Duration(self._parameters.cloud_wait)
-
-        def expected():
-            if self._boxes.waiting or stamp in self._recent:
-                return False
-            if not self._recent:
-                return self._parameters.distance == "stereo"
-            # Clouds come in order: after a later one, that of this stamp will not come.
-            return 0 < (stamp - max(self._recent)).to_sec() < self._parameters.max_age
-
-        with self._clouds:
-            while expected() and rospy.Time.now() < deadline and not rospy.is_shutdown():
-                self._clouds.wait(0.02)
-            return self._recent.get(stamp) or (self._recent[max(self._recent)] if self._recent else None)
 
     def _points(self, cloud):
         try:

@@ -4,17 +4,20 @@ import threading
 
 import cv2
 import rospy
-from sensor_msgs.msg import Image, RegionOfInterest
+from sensor_msgs.msg import Image, PointCloud2, RegionOfInterest
 
 from tld_follower.box import Box
 from tld_follower.msg import BoundingBox
-from tld_follower.nodes.conversions import box_message, grey_image, image_array
+from tld_follower.nodes.clouds import Clouds
+from tld_follower.nodes.conversions import box_message, cloud_points, grey_image, image_array
 from tld_follower.nodes.newest import Newest
 from tld_follower.nodes.settings import checked, fatal_if_wrong
 from tld_follower.tld.parameters import Parameters
 from tld_follower.tld.tracker import Tracker, warm_up
 
 GREEN, WHITE = (0, 220, 0), (255, 255, 255)
+# How long an image waits for its cloud, and clouds for an image that is still queued [s of ROS time].
+CLOUD_WAIT, CLOUD_AGE = 0.1, 0.5
 
 
 def parse_box(text):
@@ -38,11 +41,15 @@ class TrackerNode:
         settings = dict(rospy.get_param("~", {}))
         seed = checked(settings.pop("seed", 0), "seed", int, lambda value: value >= 0)
         every_frame = checked(settings.pop("every_frame", False), "every_frame", bool)
+        use_depth = checked(settings.pop("use_depth", False), "use_depth", bool)
         self._request = parse_box(settings.pop("init_box", ""))
         self._tracker = Tracker(Parameters.from_dict(settings), seed=seed)
         self._work = Newest(every=every_frame)
+        self._every_frame = every_frame
         self._request_lock = threading.Lock()
+        self._clouds = Clouds(CLOUD_AGE) if use_depth else None
         self._image = None
+        self._depth = None
         self._targets = 0
         self._stamp = rospy.Time()
         warm_up()
@@ -51,6 +58,8 @@ class TrackerNode:
         self._view = rospy.Publisher("~view", Image, queue_size=1)
         self._target = rospy.Publisher("~target", RegionOfInterest, queue_size=1, latch=True)
         rospy.Subscriber("~init", RegionOfInterest, self._init, queue_size=1)
+        if use_depth:
+            rospy.Subscriber("/stereo/points2", PointCloud2, self._clouds.put, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber(
             "/stereo/left/image_raw",
             Image,
@@ -82,12 +91,12 @@ class TrackerNode:
         box, confidence = None, 0.0
         try:
             grey = grey_image(message)
-            self._image = grey
+            self._image, self._depth = grey, self._depth_map(stamp, grey.shape)
             shown = self._learn_requested()
             if shown is not None:
                 box, confidence = shown, 1.0
             elif self._tracker.initialised:
-                result = self._tracker.update(grey)
+                result = self._tracker.update(grey, self._depth)
                 box, confidence = result.box, result.confidence
         except ValueError as error:
             rospy.logerr_throttle_identical(5.0, f"image skipped: {error}")
@@ -97,6 +106,24 @@ class TrackerNode:
         if self._view.get_num_connections():
             self._publish_view(message, box, confidence)
 
+    def _depth_map(self, stamp, shape):
+        """Return the depth [m] of each pixel of the image of this stamp; None if depth is off or missing."""
+        if self._clouds is None:
+            return None
+        cloud = self._clouds.wait(stamp, CLOUD_WAIT, lambda: self._work.waiting and not self._every_frame)
+        if cloud is None:
+            rospy.logwarn_throttle(5.0, "no point cloud for an image: going on without depth")
+            return None
+        try:
+            depth = cloud_points(cloud)[:, :, 2]
+            if depth.shape != shape:
+                (height, width), (rows, columns) = shape, depth.shape
+                raise ValueError(f"{columns}x{rows} points for an image of {width}x{height} pixels")
+        except ValueError as error:
+            rospy.logerr_throttle_identical(5.0, f"cloud ignored: {error}")
+            return None
+        return depth
+
     def _learn_requested(self):
         """Learn the requested target from the newest image; return its box, or None without a request."""
         with self._request_lock:
@@ -104,7 +131,7 @@ class TrackerNode:
         if box is None:
             return None
         try:
-            self._tracker.init(self._image, box)
+            self._tracker.init(self._image, box, self._depth)
         except ValueError as error:
             rospy.logerr(f"target refused: {error}")
             return None

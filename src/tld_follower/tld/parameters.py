@@ -12,6 +12,7 @@ TRACKERS = ("tld", "tld_sift")
 LOWER_BOUNDS = {
     **{"scale_step": 1.0, "shift": 0.0, "min_side": 2.0, "flow_side": 0.0, "window_side": 2.0},
     **{"blur": 0.0, "fusion_weight": 0.0, "max_residual": 0.0, "lk_window": 2, "sift_side": 8.0},
+    "depth_size": 1.0,
 }
 # A fern has a table of 2^comparisons posteriors.
 MAX_COMPARISONS = 20
@@ -87,6 +88,13 @@ class Parameters:
     sift_side: float = 400.0
     sift_views: int = 10
     sift_interval: int = 10
+
+    depth_error: float = 0.08
+    depth_motion: float = 0.04
+    depth_size: float = 1.5
+    depth_support: float = 0.2
+    depth_front: float = 0.2
+    depth_valid: float = 0.1
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -11,6 +11,7 @@ import numpy as np
 from tld_follower.box import Box
 from tld_follower.tld import keypoints, median_flow
 from tld_follower.tld.alignment import align, blend
+from tld_follower.tld.depth import TargetDepth
 from tld_follower.tld.detector import Cluster, Detections, Detector, overlaps
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.learning import Learner
@@ -71,19 +72,20 @@ class Tracker:
         """Number of templates in the object model."""
         return len(self._detector.model) if self.initialised else 0
 
-    def init(self, image: np.ndarray, box: Box) -> None:
+    def init(self, image: np.ndarray, box: Box, depth: np.ndarray | None = None) -> None:
         """Take a new target; what was known of another is forgotten.
 
         Parameters
         ----------
         image : uint8 (H, W) or (H, W, 3) BGR
         box : the target [pixel]; a part outside the image is cut off.
+        depth : float (H, W), the depth of each pixel [m], NaN where unknown; see `TargetDepth.look`.
 
         Raises
         ------
         ValueError
-            For an image of another kind, a box that is not finite, outside the image or under `min_side`.
-            The state stays as it was.
+            For an image or a depth map of another kind, a box that is not finite, outside the image or under
+            `min_side`. The state stays as it was.
         """
         parameters = self._parameters
         frame = Frame(image, parameters.blur)
@@ -94,6 +96,10 @@ class Tracker:
             raise ValueError(f"{box} lies outside the image of {frame.width}x{frame.height}")
         if min(inside.width, inside.height) < parameters.min_side:
             raise ValueError(f"the sides of {inside} must be at least {parameters.min_side:g} pixels")
+        target_depth = TargetDepth(parameters)
+        target_depth.look(depth, frame.height, frame.width)
+        target_depth.follow(inside, trusted=True)
+        self._depth = target_depth
         cv2.setNumThreads(1)
         rng = np.random.default_rng(self._seed)
         self._detector = Detector(frame, inside, parameters, rng)
@@ -109,15 +115,19 @@ class Tracker:
         self._velocity = (0.0, 0.0)
         self._trust = Trust(parameters)
 
-    def update(self, image: np.ndarray) -> Result:
+    def update(self, image: np.ndarray, depth: np.ndarray | None = None) -> Result:
         """Find the target in the next frame.
+
+        Parameters
+        ----------
+        image : of the first one's size; it and `depth` as for `init`.
 
         Raises
         ------
         RuntimeError
             Before `init`.
         ValueError
-            For an image of another kind or size than the first; the state stays as it was.
+            For an image or a depth map of another kind or size than the first; the state stays as it was.
         """
         if self._frame is None:
             raise RuntimeError("the tracker has no target: call init first")
@@ -127,6 +137,7 @@ class Tracker:
                 f"the image is {frame.width}x{frame.height}, the target was chosen in "
                 f"{self._frame.width}x{self._frame.height}"
             )
+        self._depth.look(depth, frame.height, frame.width)
         flow = self._track(frame)
         reach = min(
             self._parameters.tracking_scales + self._trust.missed // self._parameters.widen_frames,
@@ -139,8 +150,12 @@ class Tracker:
         else:
             self._trust.missed = 0
             self._last_box = result.box
-            if self.learning and self._trust.learnable:
+            occluded = self._depth.occluded(result.box)
+            trusted = self.learning and self._trust.learnable and not occluded
+            if trusted:
                 self._learn(frame, result.box, detections)
+            if not occluded:
+                self._depth.follow(result.box, trusted)
         self._frame = frame
         return result
 
@@ -173,11 +188,14 @@ class Tracker:
         sure = max(relative, self._detector.nn_threshold)
         rivals = [
             cluster
-            for cluster in self._detector.clusters(detections)
+            for cluster in self._clusters(detections)
             if cluster.confidence > sure and cluster.box.overlap(flow.box) < parameters.takeover_overlap
         ]
         if len(rivals) == 1:
             return self._take(rivals[0].box, rivals[0].confidence)
+        if not self._depth.agrees(box):
+            self._drop()
+            return LOST
         weak = trust.provisional
         if trust.observe(flow.residual, relative, conservative, self._detector.nn_threshold):
             self._box = box
@@ -188,15 +206,19 @@ class Tracker:
             self._box = box
         return LOST
 
+    def _clusters(self, detections: Detections) -> list[Cluster]:
+        """Clusters of detections that depth does not speak against."""
+        return [c for c in self._detector.clusters(detections) if self._depth.agrees(c.box)]
+
     def _redetect(self, frame: Frame, detections: Detections) -> Result:
         """Look for the target without a tracked box: exactly one cluster of detections takes over."""
         self._drop()
-        clusters = self._detector.clusters(detections)
+        clusters = self._clusters(detections)
         if len(clusters) == 1:
             return self._go_to(clusters[0])
         if not clusters and self._parameters.tracker == "tld_sift":
             proposal = self._memory.propose(frame, self._last_box)
-            if proposal is not None:
+            if proposal is not None and self._depth.agrees(proposal):
                 box, _ = align(frame, self._detector.model, proposal, self._parameters.align_step)
                 relative, conservative = self._similarity(frame, box)
                 if (

@@ -1,0 +1,68 @@
+"""Pairs clouds with what came of the same image."""
+
+import threading
+
+import rospy
+
+
+class Clouds:
+    """The clouds of the last `max_age` seconds, and a wait for the one of a given stamp.
+
+    The wait is in ROS time, so that a simulation in lockstep always gets the pair. After a wait in vain there
+    is no other until a cloud comes: a stereo node that has died costs one wait and no more.
+    """
+
+    def __init__(self, max_age):
+        self._max_age = max_age
+        self._changed = threading.Condition()
+        self._recent = {}  # stamp -> cloud, in order of arrival
+        self._stamp = rospy.Time()
+        self._silent = False
+
+    def put(self, message):
+        """Store a cloud; the callback of its topic."""
+        stamp = message.header.stamp
+        with self._changed:
+            self._recent = {
+                at: cloud for at, cloud in self._recent.items() if 0 < (stamp - at).to_sec() < self._max_age
+            }
+            self._recent[stamp] = message
+            self._silent = False
+            self._changed.notify_all()
+
+    def wait(self, stamp, patience, superseded):
+        """Return the cloud of a stamp, or None if it does not come.
+
+        Parameters
+        ----------
+        stamp : rospy.Time
+            One before that of the last call means that time has jumped back: later clouds are dropped.
+        patience : float
+            Seconds of ROS time.
+        superseded : callable
+            True when there is newer work, which ends the wait.
+        """
+        deadline = rospy.Time.now() + rospy.Duration(patience)
+        with self._changed:
+            if stamp < self._stamp:
+                self._recent = {at: cloud for at, cloud in self._recent.items() if at <= stamp}
+            self._stamp = stamp
+            while self._expected(stamp) and not superseded():
+                if rospy.Time.now() >= deadline or rospy.is_shutdown():
+                    break
+                self._changed.wait(0.02)
+            self._silent = stamp not in self._recent and not self._passed(stamp)
+            return self._recent.get(stamp)
+
+    @property
+    def newest(self):
+        """The newest cloud, None before the first."""
+        with self._changed:
+            return self._recent[max(self._recent)] if self._recent else None
+
+    def _expected(self, stamp):
+        return not (self._silent or stamp in self._recent or self._passed(stamp))
+
+    def _passed(self, stamp):
+        """Whether a later cloud has come: they come in order, so that of this stamp will not."""
+        return bool(self._recent) and max(self._recent) > stamp

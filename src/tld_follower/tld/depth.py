@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Depth as a feature: the target's physical size and distance, and what contradicts them.
+
+A box with sides of a pixels (root of the area) at depth z shows something of a z / f metres. The focal length
+f is constant, so a z tells sizes apart. Stereo measures disparity, d = f B / z: its error is constant in 1/z,
+and grows with z^2 in z.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tld_follower.box import Box
+from tld_follower.tld.parameters import Parameters
+
+# Share of a box's sides, about its centre, that is taken for the target rather than for what surrounds it.
+CENTER = 0.6
+# The target's front is what so small a share of its pixels exceeds: the nearest ones are wrong matches.
+FRONT = 0.1
+# A box is measured on a grid of at most about so many pixels along each side; fewer in all tell nothing.
+GRID = 48
+MIN_PIXELS = 20
+# Sizes whose median is the first estimate; later ones move it by at most this share each (a running median).
+FIRST_SIZES = 10
+SIZE_STEP = 0.01
+
+
+class TargetDepth:
+    """What depth says about one target. Where there is no depth it says nothing against any box.
+
+    Parameters
+    ----------
+    parameters : those named `depth_...`.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._depth: np.ndarray | None = None
+        self._sizes: list[float] = []
+        self._size: float | None = None
+        self._distance: float | None = None
+        self._front: float | None = None
+        self._age = 0
+
+    @property
+    def size(self) -> float | None:
+        """Side of the target times its depth [pixel m]; None until it was seen often enough."""
+        return self._size
+
+    @property
+    def distance(self) -> float | None:
+        """Depth of the target where it was last seen unoccluded [m]; None before."""
+        return self._distance
+
+    def look(self, depth: np.ndarray | None, height: int, width: int) -> None:
+        """Take the depth map of the next frame.
+
+        Parameters
+        ----------
+        depth : float (height, width), the depth z of each pixel of the image [m]; what is not positive and
+            finite is unknown. None: nothing is known of this frame.
+
+        Raises
+        ------
+        ValueError
+            For a map of another kind or size than the image's; the state stays as it was.
+        """
+        if depth is not None and (depth.shape != (height, width) or depth.dtype.kind != "f"):
+            shape = "x".join(map(str, depth.shape[::-1]))
+            raise ValueError(f"the depth map is {shape} of {depth.dtype}, the image {width}x{height}")
+        self._depth = depth
+        self._age += 1
+
+    def agrees(self, box: Box) -> bool:
+        """Whether a box may be the target: False if hardly any of its middle lies where the target must be.
+
+        The target must be at the distance that fits the box's size and its own, and where it was last seen or
+        as far from there as it may have moved since.
+        """
+        depths = self._sample(box.scale(CENTER))
+        if depths is None:
+            return True
+        low, high = self._limits(box)
+        return np.mean((depths >= low) & (depths <= high)) >= self._parameters.depth_support
+
+    def occluded(self, box: Box) -> bool:
+        """Whether something stands before the target: many pixels of the box are nearer than its front."""
+        depths = self._sample(box)
+        if depths is None or self._front is None:
+            return False
+        nearest, _ = self._widened(self._front, self._moved())
+        return np.mean(depths < nearest) > self._parameters.depth_front
+
+    def follow(self, box: Box, trusted: bool) -> None:
+        """Take in where the target is.
+
+        Parameters
+        ----------
+        box : the target, not occluded [pixel].
+        trusted : the box is sure enough to learn the target's size from it.
+        """
+        whole, middle = self._sample(box), self._sample(box.scale(CENTER))
+        if whole is None or middle is None:
+            return
+        low, high = self._limits(box)
+        middle = middle[(middle >= low) & (middle <= high)]
+        if not middle.size:
+            return
+        self._distance = float(np.median(middle))
+        self._front = float(np.quantile(whole, FRONT))
+        self._age = 0
+        if trusted:
+            self._learn_size(np.sqrt(box.area) * self._distance)
+
+    def _learn_size(self, size: float) -> None:
+        if self._size is None:
+            self._sizes.append(size)
+            if len(self._sizes) == FIRST_SIZES:
+                self._size = float(np.median(self._sizes))
+        else:
+            self._size *= float(np.clip(size / self._size, 1.0 / (1.0 + SIZE_STEP), 1.0 + SIZE_STEP))
+
+    def _sample(self, box: Box) -> np.ndarray | None:
+        """Known depths (N,) [m] on a grid over a box; None where too few pixels have one."""
+        if self._depth is None:
+            return None
+        inside = box.clip(self._depth.shape[1], self._depth.shape[0])
+        columns, rows = (
+            slice(int(start), int(np.ceil(end)), 1 + int((end - start) / GRID))
+            for start, end in ((inside.x, inside.right), (inside.y, inside.bottom))
+        )
+        depths = self._depth[rows, columns]
+        known = depths[(depths > 0.0) & (depths < np.inf)]
+        return known if known.size >= max(MIN_PIXELS, self._parameters.depth_valid * depths.size) else None
+
+    def _moved(self) -> float:
+        """Ratio by which the distance may have changed since the target was last measured."""
+        return (1.0 + self._parameters.depth_motion) ** self._age
+
+    def _limits(self, box: Box) -> tuple[float, float]:
+        """Least and greatest depth [m] that the target may have if it is in a box."""
+        low, high = 0.0, np.inf
+        if self._distance is not None:
+            low, high = self._widened(self._distance, self._moved())
+        if self._size is not None:
+            nearest, farthest = self._widened(self._size / np.sqrt(box.area), self._parameters.depth_size)
+            low, high = max(low, nearest), min(high, farthest)
+        return low, high
+
+    def _widened(self, depth: float, ratio: float) -> tuple[float, float]:
+        """Limits [m] about a depth: so much nearer or farther, and what stereo may err by."""
+        error = self._parameters.depth_error
+        inverse = 1.0 / (depth * ratio) - error
+        return 1.0 / (ratio / depth + error), 1.0 / inverse if inverse > 0.0 else np.inf
