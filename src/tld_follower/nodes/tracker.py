@@ -1,17 +1,22 @@
 """/NODE: one box for every left image, found by Tracking-Learning-Detection."""
 
+import os
 import threading
 
 import cv2
 import rospy
 from sensor_msgs.msg import Image, PointCloud2, RegionOfInterest
+from std_srvs.srv import SetBool, SetBoolResponse
 
 from tld_follower.box import Box
 from tld_follower.msg import BoundingBox
 from tld_follower.nodes.clouds import Clouds
 from tld_follower.nodes.conversions import box_message, cloud_points, grey_image, image_array
 from tld_follower.nodes.newest import Newest
+from tld_follower.nodes.requests import Requests
 from tld_follower.nodes.settings import checked, fatal_if_wrong
+from tld_follower.srv import ModelFile, ModelFileResponse
+from tld_follower.tld import storage
 from tld_follower.tld.parameters import Parameters
 from tld_follower.tld.tracker import Tracker, warm_up
 
@@ -31,6 +36,13 @@ def parse_box(text):
     return Box(x, y, width, height)
 
 
+def model_path(text):
+    """Return the path of a model file; ValueError unless it is absolute."""
+    if not os.path.isabs(text):
+        raise ValueError(f"the path of a model must be absolute, not {text!r}")
+    return text
+
+
 class TrackerNode:
     """Feeds images to a `Tracker` in one worker thread and publishes what it finds.
 
@@ -43,8 +55,13 @@ class TrackerNode:
         every_frame = checked(settings.pop("every_frame", False), "every_frame", bool)
         use_depth = checked(settings.pop("use_depth", False), "use_depth", bool)
         self._request = parse_box(settings.pop("init_box", ""))
-        self._tracker = Tracker(Parameters.from_dict(settings), seed=seed)
+        model = checked(settings.pop("model", ""), "model", str)
+        if model and self._request:
+            raise ValueError("parameters model and init_box both give a target")
+        self._parameters = Parameters.from_dict(settings)
+        self._tracker = Tracker(self._parameters, seed=seed)
         self._work = Newest(every=every_frame)
+        self._requests = Requests(self._work.wake)
         self._every_frame = every_frame
         self._request_lock = threading.Lock()
         self._clouds = Clouds(CLOUD_AGE) if use_depth else None
@@ -52,6 +69,8 @@ class TrackerNode:
         self._depth = None
         self._targets = 0
         self._stamp = rospy.Time()
+        if model:
+            self._restore(self._read_model(model))
         warm_up()
 
         self._boxes = rospy.Publisher("/pointA", BoundingBox, queue_size=10, tcp_nodelay=True)
@@ -67,6 +86,54 @@ class TrackerNode:
             queue_size=None if every_frame else 1,
             tcp_nodelay=True,
         )
+        rospy.Service("~learning", SetBool, self._switch_learning)
+        rospy.Service("~save_model", ModelFile, self._save_model)
+        rospy.Service("~load_model", ModelFile, self._load_model)
+
+    def _switch_learning(self, request):
+        def switch():
+            self._tracker.learning = request.data
+
+        self._requests.ask(switch)
+        message = f"learning is {'on' if request.data else 'off'}"
+        rospy.loginfo(message)
+        return SetBoolResponse(success=True, message=message)
+
+    def _save_model(self, request):
+        """Write the model as it is between two frames; no frame waits for the disk."""
+        try:
+            path = model_path(request.path)
+            storage.save(path, self._requests.ask(self._tracker.model), self._parameters)
+        except (ValueError, RuntimeError, OSError) as error:
+            rospy.logerr(f"model not saved: {error}")
+            return ModelFileResponse(success=False, message=str(error))
+        return ModelFileResponse(success=True, message=f"saved to {path}")
+
+    def _load_model(self, request):
+        try:
+            model = self._read_model(request.path)
+            self._requests.ask(lambda: self._restore(model))
+        except (ValueError, OSError) as error:
+            rospy.logerr(f"model not loaded: {error}")
+            return ModelFileResponse(success=False, message=str(error))
+        return ModelFileResponse(success=True, message=f"loaded {request.path}")
+
+    def _read_model(self, path):
+        try:
+            return storage.load(model_path(path), self._parameters)
+        except OSError as error:
+            raise ValueError(f"the model cannot be read: {error}") from error
+
+    def _restore(self, model):
+        """Search for the target of a model; the one before is kept where images are of another size."""
+        if self._image is not None and self._image.shape != model.image[::-1]:
+            (width, height), (rows, columns) = model.image, self._image.shape
+            raise ValueError(
+                f"the model was learnt in images of {width}x{height}, the camera gives {columns}x{rows}"
+            )
+        self._tracker.restore(model)
+        self._targets += 1
+        rospy.loginfo("target %d: from a model of %d templates", self._targets, self._tracker.templates)
 
     def _init(self, region):
         with self._request_lock:
@@ -77,6 +144,7 @@ class TrackerNode:
         """Process images until ROS shuts down."""
         while not rospy.is_shutdown():
             message = self._work.take(timeout=0.5)
+            self._requests.serve()
             if message is not None:
                 self._process(message)
             elif self._image is not None:

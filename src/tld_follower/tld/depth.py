@@ -47,6 +47,10 @@ class TargetDepth:
         """Side of the target times its depth [pixel m]; None until it was seen often enough."""
         return self._size
 
+    @size.setter
+    def size(self, value: float | None) -> None:
+        self._size = value
+
     @property
     def distance(self) -> float | None:
         """Depth of the target where it was last seen unoccluded [m]; None before."""

@@ -13,6 +13,7 @@ from tld_follower.tld.ferns import Ferns, scan_windows
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.object_model import ObjectModel, Similarity
 from tld_follower.tld.parameters import Parameters
+from tld_follower.tld.storage import Model
 from tld_follower.tld.windows import WindowSize, window_sizes
 
 CLUSTER_OVERLAP = 0.5
@@ -73,10 +74,22 @@ class Detector:
         self.min_variance = parameters.variance_ratio * frame.variance(np.array(box.as_tuple()))
         self.fern_threshold = parameters.fern_threshold
         self.nn_threshold = parameters.nn_threshold
-        self._phase = 0
+        self.phase = 0
         self._corners = np.empty((parameters.max_windows, 2), np.int32)
         self._confidences = np.empty(parameters.max_windows, np.float32)
         self._codes = np.empty((parameters.max_windows, parameters.ferns), np.int32)
+
+    def restore(self, model: Model) -> None:
+        """Take over what another detector learnt."""
+        self.ferns.restore(model.comparisons, model.counts)
+        self.sizes = window_sizes(model.target, model.comparisons, self._parameters)
+        self.min_variance = model.min_variance
+        self.fern_threshold, self.nn_threshold = model.fern_threshold, model.nn_threshold
+        self.phase = model.phase
+        for patch in model.positives:
+            self.model.positives.add(patch)
+        for patch in model.negatives:
+            self.model.negatives.add(patch)
 
     def scan(self, frame: Frame, around: Box, scales: int, threshold: float) -> Candidates:
         """Return every window that passes the variance gate and has a mean posterior above a threshold.
@@ -93,11 +106,11 @@ class Detector:
         active = [s for s in self.sizes if abs(np.log(s.width / around.width)) <= reach]
         total = sum(size.count(frame.width, frame.height) for size in active)
         stride = max(1, -(-total // self._parameters.max_windows))
-        self._phase = (self._phase + 1) % stride
+        self.phase = (self.phase + 1) % stride
         filled, boxes = 0, []
         for size in active:
             start = filled
-            sparse = (stride, self._phase)
+            sparse = (stride, self.phase)
             filled = self._scan_size(frame, size, around, threshold, sparse, start)
             boxes.append(size.boxes(self._corners[start:filled]))
         order = np.argsort(-self._confidences[:filled], kind="stable")

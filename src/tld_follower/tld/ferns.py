@@ -61,6 +61,17 @@ class Ferns:
         """Number of ferns."""
         return self.posteriors.shape[0]
 
+    @property
+    def counts(self) -> np.ndarray:
+        """Positive and negative examples seen, (2, ferns, 2^comparisons) int32."""
+        return np.stack([self._positives, self._negatives])
+
+    def restore(self, comparisons: np.ndarray, counts: np.ndarray) -> None:
+        """Take over `comparisons` and `counts` of other ferns, of the same shapes."""
+        self.comparisons = comparisons
+        self._positives[:], self._negatives[:] = counts
+        self.posteriors[:] = counts[0] / np.maximum(counts.sum(axis=0), 1)
+
     def confidence(self, codes: np.ndarray) -> np.ndarray:
         """Mean posterior of examples, given their codes (N, ferns).
 

@@ -10,6 +10,7 @@ from tld_follower.box import Box
 from tld_follower.tld.frame import Frame
 
 GRID_MARGIN = 0.05
+DESCRIPTOR = 128
 
 
 def grid(box: Box, side: int) -> np.ndarray:
@@ -51,10 +52,10 @@ class SiftKeypoints:
         x0, y0 = int(part.x), int(part.y)
         crop = gray[y0 : int(np.ceil(part.bottom)), x0 : int(np.ceil(part.right))]
         if min(crop.shape) < 8:
-            return np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)
+            return np.zeros((0, 2), np.float32), np.zeros((0, DESCRIPTOR), np.float32)
         found, descriptors = self._sift.detectAndCompute(np.ascontiguousarray(crop), None)
         if not found:
-            return np.zeros((0, 2), np.float32), np.zeros((0, 128), np.float32)
+            return np.zeros((0, 2), np.float32), np.zeros((0, DESCRIPTOR), np.float32)
         points = cv2.KeyPoint_convert(found) + np.array([x0 + 0.5, y0 + 0.5], np.float32)
         return (points * factor).astype(np.float32), descriptors
 

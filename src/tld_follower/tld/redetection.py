@@ -45,6 +45,15 @@ class SiftMemory:
         if len(self._views) > self._capacity:
             del self._views[1]
 
+    @property
+    def state(self) -> tuple[int, list[tuple[np.ndarray, np.ndarray]]]:
+        """Calls of `learn`, and of each view the keypoints (N, 2) and descriptors (N, 128), float32."""
+        return self._calls, list(self._views)
+
+    def restore(self, calls: int, views: list[tuple[np.ndarray, np.ndarray]]) -> None:
+        """Take over the `state` of another memory."""
+        self._calls, self._views = calls, list(views)
+
     def propose(self, frame: Frame, shape: Box) -> Box | None:
         """Search the whole frame for the target.
 

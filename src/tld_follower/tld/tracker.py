@@ -18,6 +18,7 @@ from tld_follower.tld.learning import Learner
 from tld_follower.tld.median_flow import Flow
 from tld_follower.tld.parameters import Parameters
 from tld_follower.tld.redetection import SiftMemory
+from tld_follower.tld.storage import Model
 from tld_follower.tld.trust import Trust
 
 
@@ -99,21 +100,84 @@ class Tracker:
         target_depth = TargetDepth(parameters)
         target_depth.look(depth, frame.height, frame.width)
         target_depth.follow(inside, trusted=True)
-        self._depth = target_depth
-        cv2.setNumThreads(1)
-        rng = np.random.default_rng(self._seed)
-        self._detector = Detector(frame, inside, parameters, rng)
-        self._learner = Learner(self._detector, parameters, rng)
+        self._begin(frame, inside, target_depth)
         self._learner.initialise(frame, inside)
+        if self._memory:
+            self._memory.learn(frame, inside)
+
+    def _begin(self, frame: Frame, box: Box, depth: TargetDepth) -> None:
+        """Set up everything for a target of which nothing is learnt yet."""
+        parameters = self._parameters
+        cv2.setNumThreads(1)
+        self._rng = np.random.default_rng(self._seed)
+        self._detector = Detector(frame, box, parameters, self._rng)
+        self._learner = Learner(self._detector, parameters, self._rng)
+        self._depth = depth
+        self._memory: SiftMemory | None = None
         if parameters.tracker == "tld_sift":
             self._sift = keypoints.SiftKeypoints(parameters.sift_keypoints, parameters.sift_side)
             self._memory = SiftMemory(self._sift, parameters.sift_views, parameters.sift_interval)
-            self._memory.learn(frame, inside)
         self._frame = frame
-        self._box: Box | None = inside
-        self._last_box = inside
+        self._box: Box | None = box
+        self._first_box = self._last_box = box
         self._velocity = (0.0, 0.0)
         self._trust = Trust(parameters)
+
+    def model(self) -> Model:
+        """Everything that was learnt of the target.
+
+        Raises
+        ------
+        RuntimeError
+            Before `init`.
+        """
+        if self._frame is None:
+            raise RuntimeError("the tracker has no target: call init first")
+        calls, views = self._memory.state if self._memory else (0, [])
+        points = [np.zeros((0, 2), np.float32), *(points for points, _ in views)]
+        descriptors = [np.zeros((0, keypoints.DESCRIPTOR), np.float32), *(found for _, found in views)]
+        detector = self._detector
+        return Model(
+            image=(self._frame.width, self._frame.height),
+            target=self._first_box,
+            last=self._last_box,
+            min_variance=detector.min_variance,
+            fern_threshold=detector.fern_threshold,
+            nn_threshold=detector.nn_threshold,
+            phase=detector.phase,
+            random=self._rng.bit_generator.state,
+            sift_calls=calls,
+            depth_size=self._depth.size,
+            comparisons=detector.ferns.comparisons.copy(),
+            counts=detector.ferns.counts,
+            positives=detector.model.positives.patches.copy(),
+            negatives=detector.model.negatives.patches.copy(),
+            view_lengths=np.array([len(points) for points, _ in views], np.int32),
+            view_points=np.concatenate(points),
+            view_descriptors=np.concatenate(descriptors),
+        )
+
+    def restore(self, model: Model) -> None:
+        """Take over a target that another tracker learnt; it is lost, and searched for in the whole image.
+
+        Parameters
+        ----------
+        model : of a tracker with the same `storage.DECISIVE` parameters.
+        """
+        depth = TargetDepth(self._parameters)
+        depth.size = model.depth_size
+        width, height = model.image
+        blank = Frame(np.zeros((height, width), np.uint8), self._parameters.blur)
+        self._begin(blank, model.target, depth)
+        self._rng.bit_generator.state = model.random
+        self._detector.restore(model)
+        if self._memory:
+            ends = np.cumsum(model.view_lengths)
+            parts = (np.split(array, ends)[:-1] for array in (model.view_points, model.view_descriptors))
+            self._memory.restore(model.sift_calls, list(zip(*parts, strict=True)))
+        self._last_box = model.last
+        self._drop()
+        self._trust.missed = self._parameters.scales * self._parameters.widen_frames
 
     def update(self, image: np.ndarray, depth: np.ndarray | None = None) -> Result:
         """Find the target in the next frame.
@@ -280,7 +344,7 @@ class Tracker:
         if frame.variance(np.array(box.as_tuple())) < self._detector.min_variance:
             return
         self._learner.update(frame, box, detections)
-        if self._parameters.tracker == "tld_sift":
+        if self._memory:
             self._memory.learn(frame, box)
 
 
