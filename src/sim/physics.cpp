@@ -21,12 +21,18 @@ Physics::Physics(const World& world) : dispatcher_(&configuration_) {
   world_ = std::make_unique<btDiscreteDynamicsWorld>(&dispatcher_, &broadphase_, &solver_,
                                                      &configuration_);
   world_->setGravity(world.gravity);
-  for (const StaticModel& model : world.models) {
+  for (const Model& model : world.models) {
     for (const Collision& collision : model.collisions) {
       btRigidBody::btRigidBodyConstructionInfo info(0, nullptr, MakeShape(collision.geometry));
-      info.m_startWorldTransform = collision.pose;
+      info.m_startWorldTransform = model.PoseAt(0) * collision.pose;
       info.m_friction = btScalar(collision.friction);
       bodies_.push_back(std::make_unique<btRigidBody>(info));
+      if (!model.script.empty()) {
+        btRigidBody* const body = bodies_.back().get();
+        body->setCollisionFlags(btCollisionObject::CF_KINEMATIC_OBJECT);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        moving_.push_back({&model, collision.pose, body});
+      }
       world_->addRigidBody(bodies_.back().get());
     }
   }
@@ -124,7 +130,12 @@ btHingeConstraint* Physics::AddHinge(const Body& parent, const Body& child, cons
   return result;
 }
 
-void Physics::Step() { world_->stepSimulation(btScalar(kStep), 0, btScalar(kStep)); }
+void Physics::Step(double time) {
+  for (const Moving& part : moving_) {
+    part.body->setWorldTransform(part.model->PoseAt(time) * part.pose);
+  }
+  world_->stepSimulation(btScalar(kStep), 0, btScalar(kStep));
+}
 
 double Physics::CastRay(const btVector3& from, const btVector3& direction, double range,
                         const btCollisionObject* ignored) const {

@@ -33,6 +33,7 @@ class Physics {
   /// Time step [s].
   static constexpr double kStep = 0.002;
 
+  /// `world` must outlive this object.
   explicit Physics(const World& world);
   ~Physics();
   Physics(const Physics&) = delete;
@@ -49,8 +50,9 @@ class Physics {
   btHingeConstraint* AddHinge(const Body& parent, const Body& child, const btVector3& pivot,
                               const btVector3& axis);
 
-  /// Advances by kStep. Forces that were applied to the bodies act during this step.
-  void Step();
+  /// Advances by kStep. Forces that were applied to the bodies act during this step. Models with a
+  /// script move to where they are at `time` [s], the end of the step; nothing stops them.
+  void Step(double time);
 
   /// Everything that can be touched, in the order in which it was added.
   const btCollisionObjectArray& objects() const { return world_->getCollisionObjectArray(); }
@@ -75,6 +77,12 @@ class Physics {
                  const btCollisionObject* ignored) const;
 
  private:
+  struct Moving {
+    const Model* model;
+    btTransform pose;  // Of the body in the model's moving frame.
+    btRigidBody* body;
+  };
+
   btCollisionShape* MakeShape(const Geometry& geometry);
   btCompoundShape* MakeCompound();
 
@@ -84,6 +92,7 @@ class Physics {
   btSequentialImpulseConstraintSolver solver_;
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
   std::vector<std::unique_ptr<btRigidBody>> bodies_;
+  std::vector<Moving> moving_;
   std::vector<std::unique_ptr<btTypedConstraint>> constraints_;
   std::unique_ptr<btDiscreteDynamicsWorld> world_;
 };

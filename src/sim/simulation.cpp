@@ -22,7 +22,8 @@ constexpr int64_t kEpisodeGap = kStepsPerSecond / 5;
 // The target's owner number in the list of contacts; other objects follow in their order.
 constexpr size_t kTarget = 0;
 
-// Frames that move, as the renderer counts them: the drone, the target's chassis and its wheels.
+// Frames that move, as the renderer counts them: the drone, the target's chassis and its wheels,
+// and the models with a script.
 enum Frame { kDroneFrame = 0, kChassisFrame = 1, kFirstWheelFrame = 2 };
 
 }  // namespace
@@ -87,9 +88,11 @@ btTransform Simulation::RobotPose(const std::string& name,
 
 Scene Simulation::MakeScene() const {
   Scene scene;
-  for (const StaticModel& model : world_.models) {
-    for (const Visual& visual : model.visuals) scene.visuals.push_back({visual, -1, false});
-    for (const Collision& shape : model.collisions) scene.shadows.push_back({shape, -1});
+  int moving_frame = kFirstWheelFrame + int(state_->husky.wheels().size());
+  for (const Model& model : world_.models) {
+    const int frame = model.script.empty() ? -1 : moving_frame++;
+    for (const Visual& visual : model.visuals) scene.visuals.push_back({visual, frame, false});
+    for (const Collision& shape : model.collisions) scene.shadows.push_back({shape, frame});
   }
   const auto add = [&scene](const RobotLink& link, const RobotLink& carrier, int frame,
                             bool target) {
@@ -126,9 +129,9 @@ Moment Simulation::Advance() {
   while (!moment.tick && !moment.frame) {
     state_->spiri.Actuate(time());
     state_->husky.Actuate(time());
-    state_->physics.Step();
-    state_->husky.Measure();
     ++step_;
+    state_->physics.Step(time());
+    state_->husky.Measure();
     CountContacts();
     moment.tick = step_ % kStepsPerTick == 0;
     moment.slow_tick = step_ % (2 * kStepsPerTick) == 0;
@@ -156,6 +159,9 @@ void Simulation::Render(StereoImages* images, TargetMask* mask) {
   const btTransform drone = state_->spiri.body().Pose();
   std::vector<btTransform> frames{drone, state_->husky.chassis().Pose()};
   for (const Husky::Wheel& wheel : state_->husky.wheels()) frames.push_back(wheel.body.Pose());
+  for (const Model& model : world_.models) {
+    if (!model.script.empty()) frames.push_back(model.PoseAt(time()));
+  }
   renderer_->Render(drone * config_.camera.Mount(), frames, images, mask);
   image_noise_.Add(frame_, Eye::kLeft, &images->left);
   image_noise_.Add(frame_, Eye::kRight, &images->right);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <sdf/sdf.hh>
+#include <sstream>
 #include <stdexcept>
 
 namespace tld_follower::sim {
@@ -124,13 +125,36 @@ double ReadFriction(const sdf::Collision& collision) {
   return friction;
 }
 
-StaticModel ReadModel(const sdf::Model& model, const WarningSink& warn) {
-  if (!model.Static()) {
+std::vector<Waypoint> ReadScript(const sdf::Model& model) {
+  std::vector<Waypoint> script;
+  if (!model.Element()->HasElement("tld:waypoint")) return script;
+  for (sdf::ElementPtr element = model.Element()->GetElement("tld:waypoint"); element;
+       element = element->GetNextElement("tld:waypoint")) {
+    std::istringstream text(element->Get<std::string>());
+    double time, x, y, z, roll, pitch, yaw;
+    std::string rest;
+    if (!(text >> time >> x >> y >> z >> roll >> pitch >> yaw) || text >> rest) {
+      throw std::runtime_error("a <tld:waypoint> of '" + model.Name() +
+                               "' is not seven numbers: t x y z roll pitch yaw");
+    }
+    if (!script.empty() && !(time > script.back().time)) {
+      throw std::runtime_error("the waypoints of '" + model.Name() + "' are not in order of time");
+    }
+    const ignition::math::Pose3d pose(x, y, z, roll, pitch, yaw);
+    script.push_back({time, FinitePose(pose, "a waypoint of '" + model.Name() + "'")});
+  }
+  return script;
+}
+
+Model ReadModel(const sdf::Model& model, const WarningSink& warn) {
+  Model result;
+  result.name = model.Name();
+  result.script = ReadScript(model);
+  if (!model.Static() && result.script.empty()) {
     warn("model '" + model.Name() + "' is not <static>; it is held in place all the same");
   }
-  StaticModel result;
-  result.name = model.Name();
-  const btTransform model_pose = Resolve(model, model.Name());
+  const btTransform model_pose =
+      result.script.empty() ? Resolve(model, model.Name()) : btTransform::getIdentity();
   for (uint64_t l = 0; l < model.LinkCount(); ++l) {
     const sdf::Link& link = *model.LinkByIndex(l);
     const btTransform link_pose = model_pose * Resolve(link, model.Name() + "::" + link.Name());
@@ -177,6 +201,19 @@ sdf::ParserConfig MakeParser(const Resources& resources) {
 }
 
 }  // namespace
+
+btTransform Model::PoseAt(double time) const {
+  if (script.empty()) return btTransform::getIdentity();
+  if (time <= script.front().time) return script.front().pose;
+  for (size_t i = 1; i < script.size(); ++i) {
+    const Waypoint &from = script[i - 1], &to = script[i];
+    if (time >= to.time) continue;
+    const btScalar share = btScalar((time - from.time) / (to.time - from.time));
+    return btTransform(from.pose.getRotation().slerp(to.pose.getRotation(), share),
+                       from.pose.getOrigin().lerp(to.pose.getOrigin(), share));
+  }
+  return script.back().pose;
+}
 
 const RobotPlacement& World::Robot(const std::string& robot) const {
   for (const RobotPlacement& placement : robots) {

@@ -10,11 +10,23 @@
 
 namespace tld_follower::sim {
 
-/// A fixed model of the world: ground, obstacle, building. Poses are in the world frame.
-struct StaticModel {
+/// Where a moving model is at a time.
+struct Waypoint {
+  double time = 0;  ///< Of the simulation [s].
+  btTransform pose = btTransform::getIdentity();
+};
+
+/// A model of the world: ground, obstacle, building. It stands still, its poses in the world frame;
+/// or it has a script that moves it, and its poses are in the moving frame.
+struct Model {
   std::string name;
   std::vector<Visual> visuals;
   std::vector<Collision> collisions;
+  std::vector<Waypoint> script;  ///< In order of time; empty if it stands still.
+
+  /// The moving frame at a time [s]: straight and evenly from waypoint to waypoint, at rest before
+  /// the first and after the last. The identity without a script.
+  btTransform PoseAt(double time) const;
 };
 
 /// A robot that a world places: `<include>` of a URDF file.
@@ -33,7 +45,7 @@ struct World {
   std::array<float, 3> sun_colour{0.8f, 0.8f, 0.8f};  ///< Linear, 0..1.
   std::array<float, 3> ambient{0.4f, 0.4f, 0.4f};     ///< Linear, 0..1.
   std::string sky_texture;                            ///< Resource URI; empty for a plain sky.
-  std::vector<StaticModel> models;
+  std::vector<Model> models;
   std::vector<RobotPlacement> robots;
 
   /// The robot called `name`. Throws std::runtime_error if the world does not place it.
@@ -44,6 +56,7 @@ struct World {
 ///
 /// Own elements, in a namespace as SDF wants it: `<tld:texture_size>` in a `<material>` is the edge
 /// of one texture repeat [m]; `<tld:sky>` in the `<world>` names the texture of the sky dome.
+/// `<tld:waypoint>` in a `<model>`, "t x y z roll pitch yaw" [s, m, rad], moves it on a script.
 /// `<pbr><metal><light_map>` is stretched once over a plane and breaks up the repeats.
 ///
 /// Throws std::runtime_error with one readable sentence that names the file if it cannot be read,

@@ -228,7 +228,7 @@ TEST(World, ReadsFrictionAndColourAndFillsInWhatIsLeftOut) {
         </visual></link></model></world></sdf>)";
   const TemporaryFile file("w.world", text);
   const World world = LoadWorld(file.path(), Resources({}), ThrowWarning);
-  const StaticModel& model = world.models.at(0);
+  const Model& model = world.models.at(0);
   EXPECT_NEAR(model.collisions[0].friction, 0.25, 1e-9);
   EXPECT_NEAR(model.collisions[1].friction, 1.0, 1e-9);
   EXPECT_LT((model.collisions[0].pose.getOrigin() - btVector3(1, 3, 0)).length(), 1e-5);
@@ -243,6 +243,61 @@ TEST(World, ReadsFrictionAndColourAndFillsInWhatIsLeftOut) {
   const TemporaryFile moving("loose.world", loose);
   LoadWorld(moving.path(), Resources({}), warnings.Sink());
   EXPECT_EQ(warnings.lines.size(), 1u);
+}
+
+std::string MovingWorld(const std::string& waypoints) {
+  return "<sdf version='1.6' xmlns:tld='urn:tld_follower'><world name='w'><model name='slab'>" +
+         waypoints +
+         "<link name='l'><collision name='c'><geometry><box><size>0.2 1 1</size></box></geometry>"
+         "</collision></link></model><include><uri>" +
+         WorldFile("spiri.urdf") +
+         "</uri><name>spiri</name><pose>0 0 0.0405 0 0 0</pose></include><include><uri>" +
+         WorldFile("husky.urdf") +
+         "</uri><name>husky</name><pose>5 0 0.1325 0 0 0</pose></include></world></sdf>";
+}
+
+TEST(World, ScriptsLeadFromWaypointToWaypoint) {
+  const TemporaryFile file("script.world",
+                           MovingWorld("<tld:waypoint>1 2 0 0 0 0 0</tld:waypoint>"
+                                       "<tld:waypoint>3 4 -6 1 0 0 1.5707963</tld:waypoint>"));
+  const World world = LoadWorld(file.path(), Resources({}), ThrowWarning);
+  const Model& slab = world.models.at(0);
+  const auto expect_at = [&slab](double time, const btVector3& place, double yaw) {
+    const btTransform pose = slab.PoseAt(time);
+    EXPECT_LT((pose.getOrigin() - place).length(), 1e-5) << "at " << time << " s";
+    const btVector3 ahead = pose.getBasis() * btVector3(1, 0, 0);
+    EXPECT_NEAR(std::atan2(ahead.y(), ahead.x()), yaw, 1e-5) << "at " << time << " s";
+  };
+  expect_at(0, {2, 0, 0}, 0);
+  expect_at(1, {2, 0, 0}, 0);
+  expect_at(2, {3, -3, 0.5}, 0.78539816);
+  expect_at(3, {4, -6, 1}, 1.5707963);
+  expect_at(9, {4, -6, 1}, 1.5707963);
+}
+
+TEST(World, ScriptsThatCannotBeMeantAreRefused) {
+  for (const char* waypoints :
+       {"<tld:waypoint>1 2 0 0 0 0</tld:waypoint>", "<tld:waypoint>1 2 0 0 0 0 0 0</tld:waypoint>",
+        "<tld:waypoint>soon</tld:waypoint>",
+        "<tld:waypoint>1 0 0 0 0 0 0</tld:waypoint><tld:waypoint>1 1 0 0 0 0 0</tld:waypoint>"}) {
+    const TemporaryFile file("script.world", MovingWorld(waypoints));
+    EXPECT_NE(ErrorOf(file.path()).find("slab"), std::string::npos) << waypoints;
+  }
+}
+
+TEST(Simulation, WhatMovesOnAScriptIsThereForClearanceAndContacts) {
+  const TemporaryFile file("script.world",
+                           MovingWorld("<tld:waypoint>4 2 0 0.65 0 0 0</tld:waypoint>"
+                                       "<tld:waypoint>6 0.2 0 0.65 0 0 0</tld:waypoint>"));
+  SimulationConfig config = FlightConfig();
+  config.world_file = file.path();
+  Simulation simulation(config, ThrowWarning);
+  RunUntil(4, &simulation);
+  const double before = simulation.Measure().clearance;
+  RunUntil(5, &simulation);
+  EXPECT_NEAR(before - simulation.Measure().clearance, 0.9, 0.05);
+  RunUntil(6, &simulation);
+  EXPECT_EQ(simulation.Measure().collisions, 1u);
 }
 
 TEST(Robot, HuskyHasItsWheelsAndMass) {

@@ -30,6 +30,8 @@ COLUMNS = (
     ("collisions", "collisions", "{:d}"),
     ("tracked_fraction", "tracked", "{:.3f}"),
     ("mean_overlap", "overlap", "{:.2f}"),
+    ("wrong_boxes", "wrong boxes", "{:d}"),
+    ("boxes_while_hidden", "while hidden", "{:d}"),
     ("losses", "losses", "{:d}"),
     ("real_time_factor", "real time", "{:.2f}x"),
 )
@@ -65,7 +67,7 @@ def parse_arguments(argv):
         "--use-depth", action="store_true", help="the tracker takes the cloud as well (default: images alone)"
     )
     parser.add_argument("--resolution", type=_resolution, default="640x480", metavar="WxH")
-    parser.add_argument("--world", type=Path, metavar="FILE", help="SDF world (default: the testing grounds)")
+    parser.add_argument("--world", type=Path, metavar="FILE", help="SDF world (default: the scenario's own)")
     parser.add_argument(
         "--image-noise", type=_number(float, 0, "0 or more"), default=1.0, metavar="SIGMA", help="grey levels"
     )
@@ -97,8 +99,7 @@ def launch_arguments(settings, scenario, seed):
         "tracker": settings.tracker,
         "use_depth": str(settings.use_depth).lower(),
     }
-    if settings.world:
-        arguments["world"] = settings.world.resolve()
+    arguments["world"] = settings.world.resolve() if settings.world else graph.world_file(scenario.world)
     return arguments
 
 
@@ -176,7 +177,7 @@ def main(argv=None):
         "tracker": settings.tracker,
         "use_depth": settings.use_depth,
         "resolution": settings.resolution,
-        "world": str(settings.world.name) if settings.world else "testing_grounds.world",
+        "world": settings.world.name if settings.world else scenario.world,
         "image_noise": settings.image_noise,
         "runs": [],
     }

@@ -10,6 +10,7 @@ import xmlrpc.client
 from contextlib import contextmanager
 
 import rosgraph
+import rospkg
 
 _CALLER = "/graph_watcher"
 _ANSWER_TIMEOUT = 5.0  # s, of a node that hangs
@@ -86,6 +87,11 @@ def wait_for_edges(wanted, timeout=60.0, alive=lambda: None):
             listed = "; ".join(f"{source} -[{topic}]-> {sink}" for source, topic, sink in sorted(missing))
             raise GraphError(f"not connected after {timeout:.0f} s: {listed}")
         time.sleep(0.1)
+
+
+def world_file(name):
+    """Path of a world of this package."""
+    return os.path.join(rospkg.RosPack().get_path("tld_follower"), "worlds", name)
 
 
 def _free_port():

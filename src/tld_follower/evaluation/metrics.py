@@ -38,12 +38,15 @@ def flight_figures(trace, drive_s):
         settle_s: from the halt until within 5 cm for good, None if never;
         visible_fraction: frames with the target in view; tracked_fraction: of those, frames with a box that
         overlaps the true one by more than 0.25; mean_overlap: over those, 0 without a box;
+        wrong_boxes: frames with a box that does not overlap the true one so; boxes_while_hidden: those
+        of them in which no pixel of the target is in view;
         losses, recoveries: of the box; recovery_s: longest time without a box that ended, None without one.
     """
     t = np.asarray(trace["t"])
     error = np.asarray(trace["distance"]) - SET_DISTANCE
     in_view, box_visible = np.asarray(trace["in_view"]), np.asarray(trace["box_visible"])
-    overlap = np.asarray(trace["overlap"])[in_view]
+    overlaps = np.asarray(trace["overlap"])
+    overlap = overlaps[in_view]
     after = t >= drive_s
     off = np.flatnonzero(after & (np.abs(error) > SETTLED))
     if not off.size:
@@ -65,6 +68,8 @@ def flight_figures(trace, drive_s):
         "visible_fraction": float(in_view.mean()),
         "tracked_fraction": float((overlap > TRACKED_OVERLAP).mean()) if overlap.size else 0.0,
         "mean_overlap": float(overlap.mean()) if overlap.size else 0.0,
+        "wrong_boxes": int((box_visible & (overlaps <= TRACKED_OVERLAP)).sum()),
+        "boxes_while_hidden": int((box_visible & ~in_view).sum()),
         "losses": len(losses),
         "recoveries": len(times),
         "recovery_s": max(times, default=None),

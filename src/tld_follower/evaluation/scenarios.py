@@ -17,11 +17,17 @@ class Scenario:
     start: float
     halt: float
     end: float
-    speed: float  # m/s
+    drive: tuple[tuple[float, float, float], ...]  # from start to halt: s, m/s forward, rad/s to the left
+    world: str = "testing_grounds.world"
 
     def target_command(self, t):
         """Speed in m/s and turn rate in rad/s that Husky is commanded at time `t`."""
-        return (self.speed, 0.0) if self.start <= t < self.halt else (0.0, 0.0)
+        t -= self.start
+        for duration, speed, turn_rate in self.drive:
+            if 0.0 <= t < duration:
+                return speed, turn_rate
+            t -= duration
+        return 0.0, 0.0
 
     def spiri_pose(self, seed):
         """Start pose x, y in m and yaw in rad; a seed moves it a little sideways and along.
@@ -38,6 +44,17 @@ class Scenario:
 SPIRI_START = (-1.5, 0.0, 0.0)
 
 # Thesis sections 4.2 and 4.3: rest, 12 s straight at 1 m/s, halt.
-STRAIGHT = Scenario("straight", box_at=4.0, start=6.0, halt=18.0, end=24.0, speed=1.0)
+STRAIGHT = Scenario("straight", box_at=4.0, start=6.0, halt=18.0, end=24.0, drive=((12.0, 1.0, 0.0),))
 
-SCENARIOS = {scenario.name: scenario for scenario in (STRAIGHT,)}
+# A slab passes between the drone and the target, twice; a model of half the target's size stands by the lane.
+OCCLUSION = Scenario(
+    "occlusion",
+    box_at=4.0,
+    start=6.0,
+    halt=22.0,
+    end=26.0,
+    drive=((16.0, 1.0, 0.0),),
+    world="occlusion.world",
+)
+
+SCENARIOS = {scenario.name: scenario for scenario in (STRAIGHT, OCCLUSION)}

@@ -75,3 +75,17 @@ def test_frames_without_the_target_do_not_count_as_missed():
     )
     assert figures["visible_fraction"] == pytest.approx(0.5)
     assert figures["tracked_fraction"] == 1
+    assert (figures["wrong_boxes"], figures["boxes_while_hidden"]) == (0, 0)
+
+
+def test_boxes_where_the_target_is_not_are_wrong():
+    figures = flight_figures(
+        flight(
+            lambda t: 1.0,
+            box_visible=lambda t: t < 10,
+            overlap=lambda t: np.where((t >= 2) & (t < 5), 0.0, 0.8),
+            in_view=lambda t: (t < 4) | (t >= 5),
+        ),
+        DRIVE,
+    )
+    assert (figures["wrong_boxes"], figures["boxes_while_hidden"]) == (90, 30)
