@@ -15,9 +15,9 @@ from tld_follower.msg import FollowState
 class StraightTest(unittest.TestCase):
     def test_follows_all_the_way(self):
         rospy.init_node("straight_test")
-        flight = Flight()
+        flight = Flight(STRAIGHT, seed=0)
         flight.wait_until_connected()
-        trace, _ = flight.fly(STRAIGHT)
+        trace, _ = flight.fly()
         figures = flight_figures(trace, STRAIGHT.halt - STRAIGHT.start)
         rospy.loginfo("%s", figures)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import rospy
 
 from tld_follower.evaluation import graph, plots
+from tld_follower.evaluation.film import Film
 from tld_follower.evaluation.flight import Flight
 from tld_follower.evaluation.metrics import flight_figures
 from tld_follower.evaluation.scenarios import SCENARIOS
@@ -79,6 +80,12 @@ def parse_arguments(argv):
     parser.add_argument(
         "--report", type=Path, metavar="DIR", help="write plots, and a video of the first run"
     )
+    parser.add_argument(
+        "--film",
+        type=Path,
+        metavar="DIR",
+        help="save each flight as a sequence for evaluate: DIR/SCENARIO-SEED",
+    )
     return parser.parse_args(argv)
 
 
@@ -107,18 +114,21 @@ def fly(settings, seed, logs, video_path):
     """Fly one seed on a fresh graph; return the run's object for the JSON."""
     scenario = SCENARIOS[settings.scenario]
     with ExitStack() as stack:
-        video = None
+        watchers = []
         if video_path:
             size = tuple(map(int, settings.resolution.split("x")))
-            video = plots.Video(video_path, size, FRAME_RATE)
-            stack.callback(video.close)
-        flight = Flight(on_image=video.add if video else None)
+            watchers.append(plots.Video(video_path, size, FRAME_RATE))
+        if settings.film:
+            watchers.append(Film(settings.film / f"{scenario.name}-{seed}"))
+        for watcher in watchers:
+            stack.callback(watcher.close)
+        flight = Flight(scenario, seed, [watcher.add for watcher in watchers])
         stack.callback(flight.close)
         log = logs / f"{scenario.name}-{seed}.log"
         arguments = launch_arguments(settings, scenario, seed)
         alive = stack.enter_context(graph.launched("follow.launch", arguments, log))
         flight.wait_until_connected(alive, settings.use_depth)
-        trace, real_time_factor = flight.fly(scenario, alive)
+        trace, real_time_factor = flight.fly(alive)
     figures = flight_figures(trace, scenario.halt - scenario.start)
     return {"seed": seed, **figures, "real_time_factor": real_time_factor, "trace": trace}
 
@@ -147,9 +157,9 @@ def write_report(result, directory, drive_s):
 
 
 def prepare_outputs(settings):
-    """Make the folders of report and JSON; raises OSError before anything has flown in vain."""
-    if settings.report:
-        settings.report.mkdir(parents=True, exist_ok=True)
+    """Make the folders of report, films and JSON; raises OSError before anything has flown in vain."""
+    for folder in filter(None, (settings.report, settings.film)):
+        folder.mkdir(parents=True, exist_ok=True)
     if settings.json:
         settings.json.resolve().parent.mkdir(parents=True, exist_ok=True)
         settings.json.open("a").close()
@@ -198,7 +208,7 @@ def main(argv=None):
                     flush=True,
                 )
             rospy.signal_shutdown("done")
-    except (graph.GraphError, rospy.ROSException) as error:
+    except (graph.GraphError, rospy.ROSException, OSError) as error:
         print(f"experiment: {error}\nexperiment: logs are in {logs}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -211,4 +221,6 @@ def main(argv=None):
     if settings.report:
         paths = [*write_report(result, settings.report, scenario.halt - scenario.start), video]
         print("plots and video:", *paths, sep="\n  ")
+    if settings.film:
+        print(f"films: {settings.film}")
     return 0

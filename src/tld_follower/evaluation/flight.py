@@ -5,16 +5,11 @@ import threading
 import time
 
 import rospy
-from geometry_msgs.msg import Twist
-from sensor_msgs.msg import Image, RegionOfInterest
-from std_srvs.srv import Empty
+from sensor_msgs.msg import RegionOfInterest
 
-from tld_follower.evaluation.graph import DEPTH_EDGE, FLYING_EDGES, GraphError, wait_for_edges
-from tld_follower.msg import BoundingBox, FollowState, Truth
+from tld_follower.evaluation.graph import DEPTH_EDGE, FLYING_EDGES, GraphError
+from tld_follower.evaluation.stage import FRAME_TIMEOUT, Stage
 from tld_follower.nodes.conversions import message_box
-
-# How long one frame may take before the flight is given up; lockstep itself goes on after less.
-FRAME_TIMEOUT = 60.0  # s of wall-clock time
 
 
 def _known(value):
@@ -23,39 +18,33 @@ def _known(value):
 
 
 class Flight:
-    """The driver and scorer of a simulation in lockstep that waits for /husky/cmd_vel as well as /cmd_vel.
+    """A scenario on the whole graph: the target is boxed, and every frame from then on is recorded.
 
-    It answers every frame once truth, box and follower state (and the image, if watched) of that frame are
-    here, so that every run of a seed sees the same commands at the same frames.
+    Parameters
+    ----------
+    scenario : Scenario
+    seed : int
+    watchers : sequence of callables
+        Called with every frame (messages truth, box, state and image) and its time since the start of the
+        drive in s, from the frame on in which the target is boxed.
     """
 
-    def __init__(self, on_image=None):
-        self._on_image = on_image
-        self._topics = {"truth": "/gazebo/truth", "box": "/pointA", "state": "/pointsdepthA/state"}
-        types = {"truth": Truth, "box": BoundingBox, "state": FollowState, "image": Image}
-        if on_image:
-            self._topics["image"] = "/stereo/left/image_raw"
-        self._frames = {}  # stamp -> {kind: message}
+    def __init__(self, scenario, seed, watchers=()):
+        self._scenario = scenario
+        self._watchers = watchers
+        self._stage = Stage(
+            scenario, seed, ("truth", "box", "state", "image") if watchers else ("truth", "box", "state")
+        )
         self._changed = threading.Condition()
         self._targets = 0
-        self._drive = rospy.Publisher("/husky/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
         self._init = rospy.Publisher("/NODE/init", RegionOfInterest, queue_size=1, tcp_nodelay=True)
-        self._subscribers = [
-            rospy.Subscriber(topic, types[kind], self._store, kind, queue_size=10, tcp_nodelay=True)
-            for kind, topic in self._topics.items()
-        ]
-        self._subscribers.append(rospy.Subscriber("/NODE/target", RegionOfInterest, self._learnt))
+        self._target = rospy.Subscriber("/NODE/target", RegionOfInterest, self._learnt)
 
     def close(self):
         """Take this flight's topics off the graph."""
-        for topic in [*self._subscribers, self._drive, self._init]:
-            topic.unregister()
-
-    def _store(self, message, kind):
-        stamp = message.captured if kind == "box" else message.header.stamp
-        with self._changed:
-            self._frames.setdefault(stamp, {})[kind] = message
-            self._changed.notify_all()
+        self._stage.close()
+        self._init.unregister()
+        self._target.unregister()
 
     def _learnt(self, _):
         with self._changed:
@@ -65,70 +54,37 @@ class Flight:
     def wait_until_connected(self, alive=lambda: None, use_depth=False):
         """Wait for every edge of the graph, the tracker's clouds with `use_depth`, and this flight's own."""
         me = rospy.get_name()
-        sources = {"truth": "/gazebo", "box": "/NODE", "state": "/pointsdepthA", "image": "/gazebo"}
-        own = {(sources[kind], topic, me) for kind, topic in self._topics.items()}
-        own |= {(me, "/husky/cmd_vel", "/gazebo"), (me, "/NODE/init", "/NODE"), ("/NODE", "/NODE/target", me)}
-        if use_depth:
-            own.add(DEPTH_EDGE)
-        wait_for_edges(FLYING_EDGES | own, alive=alive)
+        edges = FLYING_EDGES | {(me, "/NODE/init", "/NODE"), ("/NODE", "/NODE/target", me)}
+        self._stage.wait_until_connected(edges | {DEPTH_EDGE} if use_depth else edges, alive)
 
-    def fly(self, scenario, alive=lambda: None):
-        """Fly a scenario from the simulation's start.
+    def fly(self, alive=lambda: None):
+        """Fly the scenario from the simulation's start.
 
         Parameters
         ----------
-        scenario : Scenario
         alive : callable
             Called while waiting; raises if the graph has died.
 
         Returns
         -------
         trace : dict of lists
-            One entry a frame from the boxing on; see `metrics.flight_figures` and `_record`.
+            One entry a frame after the boxing; see `metrics.flight_figures` and `_record`.
         real_time_factor : float
             Simulated over wall-clock time, of the traced part.
         """
-        rospy.wait_for_service("/gazebo/unpause_physics", timeout=30.0)
-        rospy.ServiceProxy("/gazebo/unpause_physics", Empty)()
         trace = {}
         boxed_at = None
-        done = rospy.Time()
-        while True:
-            stamp, frame = self._next_frame(done, alive)
-            done = stamp
-            t = stamp.to_sec()
-            if boxed_at is None and t >= scenario.box_at:
+        for t, frame in self._stage.frames(alive):
+            if boxed_at is not None:
+                self._record(trace, t - self._scenario.start, frame)
+            elif t >= self._scenario.box_at:
                 self._box_target(frame["truth"], alive)
                 boxed_at, began = t, time.monotonic()
-            elif boxed_at is not None:
-                self._record(trace, t - scenario.start, frame)
-                if self._on_image:
-                    self._on_image(frame, t - scenario.start)
-            if t >= scenario.end:
-                return trace, (t - boxed_at) / (time.monotonic() - began)
-            command = Twist()
-            command.linear.x, command.angular.z = scenario.target_command(t)
-            self._drive.publish(command)
-
-    def _next_frame(self, after, alive):
-        """Wait for the next frame that is complete; return its stamp and messages."""
-        deadline = time.monotonic() + FRAME_TIMEOUT
-        with self._changed:
-            while True:
-                for stamp in sorted(self._frames):
-                    if stamp <= after:
-                        del self._frames[stamp]
-                    elif len(self._frames[stamp]) == len(self._topics):
-                        return stamp, self._frames.pop(stamp)
-                self._changed.wait(1.0)
-                alive()
-                if time.monotonic() > deadline:
-                    newest = self._frames[max(self._frames)] if self._frames else {}
-                    missing = [topic for kind, topic in self._topics.items() if kind not in newest]
-                    raise GraphError(
-                        f"no whole frame for {FRAME_TIMEOUT:.0f} s after t = {after.to_sec():.3f} s; "
-                        f"missing: {', '.join(missing)}"
-                    )
+            else:
+                continue
+            for watch in self._watchers:
+                watch(frame, t - self._scenario.start)
+        return trace, (t - boxed_at) / (time.monotonic() - began)
 
     def _box_target(self, truth, alive):
         """Show the tracker the true box of this very frame, and wait until it has learnt it."""

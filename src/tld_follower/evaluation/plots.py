@@ -10,9 +10,10 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
+from tld_follower.evaluation.film import picture
 from tld_follower.evaluation.metrics import SET_DISTANCE
 from tld_follower.following.follower import Mode
-from tld_follower.nodes.conversions import image_array, message_box
+from tld_follower.nodes.conversions import message_box
 
 TRUTH, FOUND, INK = "#5b6770", "#d1495b", "#222222"
 _FRAME_STEP = 2  # every second frame goes into the video
@@ -103,28 +104,26 @@ class Video:
 
 def annotate(frame, t):
     """Draw boxes, mode and distances into a frame's image; returns BGR."""
-    picture = image_array(frame["image"])
-    if frame["image"].encoding == "rgb8":
-        picture = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
+    drawn = picture(frame["image"])
     truth, state = frame["truth"], frame["state"]
     for message, colour, width in ((truth.target_box, (255, 255, 255), 1), (frame["box"], (60, 220, 60), 2)):
         box = message_box(message)
         if box is not None:
             corners = [(round(box.x), round(box.y)), (round(box.right), round(box.bottom))]
-            cv2.rectangle(picture, *corners, colour, width)
+            cv2.rectangle(drawn, *corners, colour, width)
     text = (
         f"{t:+6.2f} s  {Mode(state.mode).name}  true {truth.distance:.2f} m  measured {state.distance:.2f} m"
     )
-    place = (8, picture.shape[0] - 10)
+    place = (8, drawn.shape[0] - 10)
     for colour, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
         cv2.putText(
-            picture,
+            drawn,
             text,
             place,
             cv2.FONT_HERSHEY_SIMPLEX,
-            picture.shape[1] / 1200,
+            drawn.shape[1] / 1200,
             colour,
             width,
             cv2.LINE_AA,
         )
-    return picture
+    return drawn

@@ -20,7 +20,9 @@ class Scenario:
     drive: tuple[tuple[float, float, float], ...]  # from start to halt: s, m/s forward, rad/s to the left
     world: str = "testing_grounds.world"
 
-    def target_command(self, t):
+    scripted = False  # the follower flies the drone
+
+    def target_command(self, t, _seed):
         """Speed in m/s and turn rate in rad/s that Husky is commanded at time `t`."""
         t -= self.start
         for duration, speed, turn_rate in self.drive:

@@ -52,6 +52,38 @@ class Sequence:
         return replace(self, name=name, truth=self.truth[first - 1 : last], start=self.start + first - 1)
 
 
+class Writer:
+    """Writes a sequence folder frame by frame: img/NNNNN.png and groundtruth.txt.
+
+    Raises
+    ------
+    OSError
+        If the folder or a file in it cannot be written.
+    """
+
+    def __init__(self, folder: Path):
+        """Make the folder; frames of an earlier sequence in it are removed."""
+        self._folder = folder
+        (folder / "img").mkdir(parents=True, exist_ok=True)
+        for path in _images(folder):
+            path.unlink()
+        self._truth: list[str] = []
+
+    def add(self, image: np.ndarray, box: Box | None) -> None:
+        """Add a frame, uint8 (H, W, 3) BGR, and the target's box in it [pixel, 0-based]."""
+        number = len(self._truth) + 1
+        path = self._folder / "img" / f"{number:05d}.png"
+        # PNG is lossless; noise compresses badly, so quickly.
+        if not cv2.imwrite(str(path), image, [cv2.IMWRITE_PNG_COMPRESSION, 1]):
+            raise OSError(f"{path}: cannot be written")
+        values = ("NaN",) * 4 if box is None else (box.x + 1.0, box.y + 1.0, box.width, box.height)
+        self._truth.append(",".join(v if isinstance(v, str) else f"{v:.10g}" for v in values))
+
+    def close(self) -> None:
+        """Write the annotation of the frames so far."""
+        (self._folder / "groundtruth.txt").write_text("".join(f"{line}\n" for line in self._truth))
+
+
 def load(folder: Path) -> Sequence:
     """Read a sequence's annotation and check that the video has as many frames.
 

@@ -8,9 +8,9 @@ from tld_follower.evaluation.scenarios import SCENARIOS, SPIRI_START, STRAIGHT, 
 
 def test_straight_is_the_thesis_experiment():
     assert STRAIGHT.halt - STRAIGHT.start == pytest.approx(12.0)
-    assert STRAIGHT.target_command(STRAIGHT.start - 0.01) == (0.0, 0.0)
-    assert STRAIGHT.target_command(STRAIGHT.start) == (1.0, 0.0)
-    assert STRAIGHT.target_command(STRAIGHT.halt) == (0.0, 0.0)
+    assert STRAIGHT.target_command(STRAIGHT.start - 0.01, 0) == (0.0, 0.0)
+    assert STRAIGHT.target_command(STRAIGHT.start, 0) == (1.0, 0.0)
+    assert STRAIGHT.target_command(STRAIGHT.halt, 0) == (0.0, 0.0)
 
 
 def test_the_target_drives_its_pieces_one_after_the_other():
