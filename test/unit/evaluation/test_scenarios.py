@@ -18,7 +18,7 @@ def test_the_target_drives_its_pieces_one_after_the_other():
     scenario = Scenario("s", box_at=1.0, start=2.0, halt=6.5, end=7.0, drive=drive)
     times = (1.9, 2.0, 2.9, 3.1, 4.9, 5.1, 6.4, 6.6)
     commands = [(0, 0), (0.5, 0), (0.5, 0), (0, 0.7), (0, 0.7), (-1, 0), (-1, 0), (0, 0)]
-    assert [scenario.target_command(t) for t in times] == commands
+    assert [scenario.target_command(t, 0) for t in times] == commands
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS)
