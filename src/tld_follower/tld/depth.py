@@ -15,14 +15,15 @@ from tld_follower.tld.parameters import Parameters
 
 # Share of a box's sides, about its centre, that is taken for the target rather than for what surrounds it.
 CENTER = 0.6
-# The target's front is what so small a share of its pixels exceeds: the nearest ones are wrong matches.
+# The target's front: so small a share of its pixels is nearer, those of wrong matches.
 FRONT = 0.1
 # A box is measured on a grid of at most about so many pixels along each side; fewer in all tell nothing.
 GRID = 48
 MIN_PIXELS = 20
-# Sizes whose median is the first estimate; later ones move it by at most this share each (a running median).
+# Sizes whose median is the first estimate; a later value moves an estimate by at most this share, which makes
+# it a running median.
 FIRST_SIZES = 10
-SIZE_STEP = 0.01
+STEP = 0.01
 
 
 class TargetDepth:
@@ -39,7 +40,7 @@ class TargetDepth:
         self._sizes: list[float] = []
         self._size: float | None = None
         self._distance: float | None = None
-        self._front: float | None = None
+        self._relief: float | None = None
         self._age = 0
 
     @property
@@ -90,9 +91,9 @@ class TargetDepth:
     def occluded(self, box: Box) -> bool:
         """Whether something stands before the target: many pixels of the box are nearer than its front."""
         depths = self._sample(box)
-        if depths is None or self._front is None:
+        if depths is None or self._relief is None:
             return False
-        nearest, _ = self._widened(self._front, self._moved())
+        nearest = self._nearer(self._relief * self._distance - self._moved)
         return np.mean(depths < nearest) > self._parameters.depth_front
 
     def follow(self, box: Box, trusted: bool) -> None:
@@ -100,8 +101,8 @@ class TargetDepth:
 
         Parameters
         ----------
-        box : the target, not occluded [pixel].
-        trusted : the box is sure enough to learn the target's size from it.
+        box : the target [pixel].
+        trusted : the box is sure enough to learn the target's size from it, and the target not occluded.
         """
         whole, middle = self._sample(box), self._sample(box.scale(CENTER))
         if whole is None or middle is None:
@@ -111,9 +112,10 @@ class TargetDepth:
         if not middle.size:
             return
         self._distance = float(np.median(middle))
-        self._front = float(np.quantile(whole, FRONT))
         self._age = 0
         if trusted:
+            relief = float(np.quantile(whole, FRONT)) / self._distance
+            self._relief = relief if self._relief is None else _stepped(self._relief, relief)
             self._learn_size(np.sqrt(box.area) * self._distance)
 
     def _learn_size(self, size: float) -> None:
@@ -122,7 +124,7 @@ class TargetDepth:
             if len(self._sizes) == FIRST_SIZES:
                 self._size = float(np.median(self._sizes))
         else:
-            self._size *= float(np.clip(size / self._size, 1.0 / (1.0 + SIZE_STEP), 1.0 + SIZE_STEP))
+            self._size = _stepped(self._size, size)
 
     def _sample(self, box: Box) -> np.ndarray | None:
         """Known depths (N,) [m] on a grid over a box; None where too few pixels have one."""
@@ -137,22 +139,32 @@ class TargetDepth:
         known = depths[(depths > 0.0) & (depths < np.inf)]
         return known if known.size >= max(MIN_PIXELS, self._parameters.depth_valid * depths.size) else None
 
-    def _moved(self) -> float:
-        """Ratio by which the distance may have changed since the target was last measured."""
-        return (1.0 + self._parameters.depth_motion) ** self._age
-
     def _limits(self, box: Box) -> tuple[float, float]:
         """Least and greatest depth [m] that the target may have if it is in a box."""
         low, high = 0.0, np.inf
         if self._distance is not None:
-            low, high = self._widened(self._distance, self._moved())
+            low, high = self._distance - self._moved, self._distance + self._moved
         if self._size is not None:
-            nearest, farthest = self._widened(self._size / np.sqrt(box.area), self._parameters.depth_size)
-            low, high = max(low, nearest), min(high, farthest)
-        return low, high
+            fitting = self._size / np.sqrt(box.area)
+            low = max(low, fitting / self._parameters.depth_size)
+            high = min(high, fitting * self._parameters.depth_size)
+        return self._nearer(low), self._farther(high)
 
-    def _widened(self, depth: float, ratio: float) -> tuple[float, float]:
-        """Limits [m] about a depth: so much nearer or farther, and what stereo may err by."""
-        error = self._parameters.depth_error
-        inverse = 1.0 / (depth * ratio) - error
-        return 1.0 / (ratio / depth + error), 1.0 / inverse if inverse > 0.0 else np.inf
+    @property
+    def _moved(self) -> float:
+        """Most that the target's distance can have changed since it was last measured [m]."""
+        return self._age * self._parameters.depth_motion
+
+    def _nearer(self, depth: float) -> float:
+        """Return what stereo may measure at least where the depth is so much [m]."""
+        return 1.0 / (1.0 / depth + self._parameters.depth_error) if depth > 0.0 else 0.0
+
+    def _farther(self, depth: float) -> float:
+        """Return what stereo may measure at most where the depth is so much [m]."""
+        inverse = 1.0 / depth - self._parameters.depth_error
+        return 1.0 / inverse if inverse > 0.0 else np.inf
+
+
+def _stepped(estimate: float, value: float) -> float:
+    """Return an estimate moved towards a value by at most STEP of itself."""
+    return estimate * float(np.clip(value / estimate, 1.0 / (1.0 + STEP), 1.0 + STEP))

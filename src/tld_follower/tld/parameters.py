@@ -89,9 +89,9 @@ class Parameters:
     sift_views: int = 10
     sift_interval: int = 10
 
-    depth_error: float = 0.08
-    depth_motion: float = 0.04
-    depth_size: float = 1.5
+    depth_error: float = 0.03
+    depth_motion: float = 0.1
+    depth_size: float = 1.4
     depth_support: float = 0.2
     depth_front: float = 0.2
     depth_valid: float = 0.1

@@ -214,12 +214,10 @@ class Tracker:
         else:
             self._trust.missed = 0
             self._last_box = result.box
-            occluded = self._depth.occluded(result.box)
-            trusted = self.learning and self._trust.learnable and not occluded
+            trusted = self.learning and self._trust.learnable and not self._depth.occluded(result.box)
             if trusted:
                 self._learn(frame, result.box, detections)
-            if not occluded:
-                self._depth.follow(result.box, trusted)
+            self._depth.follow(result.box, trusted)
         self._frame = frame
         return result
 
