@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -67,6 +67,16 @@ class Tracker:
     def initialised(self) -> bool:
         """True once a target was given."""
         return self._frame is not None
+
+    @property
+    def tracking(self) -> bool:
+        """True while a box is followed from frame to frame, also while it is too doubtful to be shown."""
+        return self.initialised and self._box is not None
+
+    @property
+    def box(self) -> Box:
+        """The box that is followed, else the last one [pixel]."""
+        return self._box or self._last_box
 
     @property
     def templates(self) -> int:
@@ -220,6 +230,19 @@ class Tracker:
             self._depth.follow(result.box, trusted)
         self._frame = frame
         return result
+
+    def change_view(self, image: np.ndarray, shift: float) -> None:
+        """Go on in the images of another camera, parallel to the one so far.
+
+        Parameters
+        ----------
+        image : that camera's view of the frame seen last, of the same size.
+        shift : by which the target lies further right there [pixel].
+        """
+        self._frame = Frame(image, self._parameters.blur)
+        moved = replace(self.box, x=self.box.x + shift)
+        self._box = moved if self.tracking else None
+        self._last_box = replace(self._last_box, x=self._last_box.x + shift)
 
     def _track(self, frame: Frame) -> Flow | None:
         """Follow the box by median flow; where that fails, once more from the speed that it had."""
