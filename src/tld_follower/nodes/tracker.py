@@ -18,11 +18,12 @@ from tld_follower.nodes.settings import checked, fatal_if_wrong
 from tld_follower.srv import ModelFile, ModelFileResponse
 from tld_follower.tld import storage
 from tld_follower.tld.parameters import Parameters
+from tld_follower.tld.stereo_view import StereoTracker, View
 from tld_follower.tld.tracker import Tracker, warm_up
 
 GREEN, WHITE = (0, 220, 0), (255, 255, 255)
-# How long an image waits for its cloud, and clouds for an image that is still queued [s of ROS time].
-CLOUD_WAIT, CLOUD_AGE = 0.1, 0.5
+# How long an image waits for its cloud or its twin, and these for an image still queued [s of ROS time].
+PAIR_WAIT, PAIR_AGE = 0.1, 0.5
 
 
 def parse_box(text):
@@ -43,6 +44,11 @@ def model_path(text):
     return text
 
 
+def depth_map(cloud):
+    """Return the depth [m] of each pixel, from a sensor_msgs/PointCloud2."""
+    return cloud_points(cloud)[:, :, 2]
+
+
 class TrackerNode:
     """Feeds images to a `Tracker` in one worker thread and publishes what it finds.
 
@@ -54,19 +60,23 @@ class TrackerNode:
         seed = checked(settings.pop("seed", 0), "seed", int, lambda value: value >= 0)
         every_frame = checked(settings.pop("every_frame", False), "every_frame", bool)
         use_depth = checked(settings.pop("use_depth", False), "use_depth", bool)
+        use_right = checked(settings.pop("use_right_camera", False), "use_right_camera", bool)
         self._request = parse_box(settings.pop("init_box", ""))
         model = checked(settings.pop("model", ""), "model", str)
         if model and self._request:
             raise ValueError("parameters model and init_box both give a target")
         self._parameters = Parameters.from_dict(settings)
         self._tracker = Tracker(self._parameters, seed=seed)
+        self._stereo = StereoTracker(self._tracker)
         self._work = Newest(every=every_frame)
         self._requests = Requests(self._work.wake)
         self._every_frame = every_frame
         self._request_lock = threading.Lock()
-        self._clouds = Clouds(CLOUD_AGE) if use_depth else None
+        self._clouds = Clouds(PAIR_AGE) if use_depth else None
+        self._rights = Clouds(PAIR_AGE) if use_right else None
         self._image = None
         self._depth = None
+        self._right = None
         self._targets = 0
         self._stamp = rospy.Time()
         if model:
@@ -79,6 +89,10 @@ class TrackerNode:
         rospy.Subscriber("~init", RegionOfInterest, self._init, queue_size=1)
         if use_depth:
             rospy.Subscriber("/stereo/points2", PointCloud2, self._clouds.put, queue_size=1, tcp_nodelay=True)
+        if use_right:
+            rospy.Subscriber(
+                "/stereo/right/image_raw", Image, self._rights.put, queue_size=1, tcp_nodelay=True
+            )
         rospy.Subscriber(
             "/stereo/left/image_raw",
             Image,
@@ -132,6 +146,7 @@ class TrackerNode:
                 f"the model was learnt in images of {width}x{height}, the camera gives {columns}x{rows}"
             )
         self._tracker.restore(model)
+        self._stereo.forget()
         self._targets += 1
         rospy.loginfo("target %d: from a model of %d templates", self._targets, self._tracker.templates)
 
@@ -159,12 +174,14 @@ class TrackerNode:
         box, confidence = None, 0.0
         try:
             grey = grey_image(message)
-            self._image, self._depth = grey, self._depth_map(stamp, grey.shape)
+            self._image = grey
+            self._right = self._paired(self._rights, stamp, grey_image, "right image")
+            self._depth = self._paired(self._clouds, stamp, depth_map, "point cloud")
             shown = self._learn_requested()
             if shown is not None:
                 box, confidence = shown, 1.0
             elif self._tracker.initialised:
-                result = self._tracker.update(grey, self._depth)
+                result = self._stereo.update(grey, self._depth, self._right)
                 box, confidence = result.box, result.confidence
         except ValueError as error:
             rospy.logerr_throttle_identical(5.0, f"image skipped: {error}")
@@ -174,23 +191,23 @@ class TrackerNode:
         if self._view.get_num_connections():
             self._publish_view(message, box, confidence)
 
-    def _depth_map(self, stamp, shape):
-        """Return the depth [m] of each pixel of the image of this stamp; None if depth is off or missing."""
-        if self._clouds is None:
+    def _paired(self, source, stamp, read, name):
+        """Return what else came of the image of a stamp, as `read` gives it; None without it."""
+        if source is None:
             return None
-        cloud = self._clouds.wait(stamp, CLOUD_WAIT, lambda: self._work.waiting and not self._every_frame)
-        if cloud is None:
-            rospy.logwarn_throttle(5.0, "no point cloud for an image: going on without depth")
+        message = source.wait(stamp, PAIR_WAIT, lambda: self._work.waiting and not self._every_frame)
+        if message is None:
+            rospy.logwarn_throttle_identical(5.0, f"no {name} for an image: going on without")
             return None
         try:
-            depth = cloud_points(cloud)[:, :, 2]
-            if depth.shape != shape:
-                (height, width), (rows, columns) = shape, depth.shape
-                raise ValueError(f"{columns}x{rows} points for an image of {width}x{height} pixels")
+            pixels = read(message)
+            if pixels.shape != self._image.shape:
+                (height, width), (rows, columns) = self._image.shape, pixels.shape
+                raise ValueError(f"{columns}x{rows} pixels for an image of {width}x{height}")
         except ValueError as error:
-            rospy.logerr_throttle_identical(5.0, f"cloud ignored: {error}")
+            rospy.logerr_throttle_identical(5.0, f"{name} ignored: {error}")
             return None
-        return depth
+        return pixels
 
     def _learn_requested(self):
         """Learn the requested target from the newest image; return its box, or None without a request."""
@@ -199,7 +216,7 @@ class TrackerNode:
         if box is None:
             return None
         try:
-            self._tracker.init(self._image, box, self._depth)
+            self._stereo.init(self._image, box, self._depth, self._right)
         except ValueError as error:
             rospy.logerr(f"target refused: {error}")
             return None
@@ -224,7 +241,7 @@ class TrackerNode:
         if box is None:
             text = "lost" if self._targets else "waiting for a target"
         else:
-            text = f"{confidence:.2f}"
+            text = f"{confidence:.2f}{' right camera' if self._stereo.view is View.RIGHT else ''}"
             corner = (round(box.x), round(box.y))
             cv2.rectangle(pixels, corner, (round(box.x + box.width), round(box.y + box.height)), GREEN, 2)
         cv2.putText(
