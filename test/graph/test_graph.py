@@ -12,7 +12,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Image, PointCloud2, RegionOfInterest
 
-from tld_follower.evaluation.graph import FLYING_EDGES, edges, wait_for_edges
+from tld_follower.evaluation.graph import DEPTH_EDGE, FLYING_EDGES, edges, wait_for_edges
 from tld_follower.msg import BoundingBox, BoundingBoxStamped, FollowState, Truth
 
 CAMERAS = [f"/stereo/{side}/{topic}" for side in ("left", "right") for topic in ("image_raw", "camera_info")]
@@ -67,7 +67,8 @@ class GraphTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.init_node("graph_test")
-        wait_for_edges(FLYING_EDGES, timeout=WAIT)
+        cls.wanted = FLYING_EDGES | ({DEPTH_EDGE} if rospy.get_param("/NODE/use_depth") else set())
+        wait_for_edges(cls.wanted, timeout=WAIT)
 
     def tearDown(self):
         for node in TABLE:
@@ -89,7 +90,7 @@ class GraphTest(unittest.TestCase):
             for edge in unwatched
             if edge[1] not in ("/rosout", "/rosout_agg", "/clock", "/tf", "/tf_static")
         }
-        self.assertEqual(found, FLYING_EDGES)
+        self.assertEqual(found, self.wanted)
 
     def test_no_node_reads_the_truth(self):
         _, subscribers, _ = rosgraph.Master("/graph_test").getSystemState()

@@ -37,6 +37,7 @@ class TargetDepth:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self._depth: np.ndarray | None = None
+        self._before: np.ndarray | None = None
         self._sizes: list[float] = []
         self._size: float | None = None
         self._distance: float | None = None
@@ -73,7 +74,7 @@ class TargetDepth:
         if depth is not None and (depth.shape != (height, width) or depth.dtype.kind != "f"):
             shape = "x".join(map(str, depth.shape[::-1]))
             raise ValueError(f"the depth map is {shape} of {depth.dtype}, the image {width}x{height}")
-        self._depth = depth
+        self._before, self._depth = self._depth, depth
         self._age += 1
 
     def agrees(self, box: Box) -> bool:
@@ -91,10 +92,17 @@ class TargetDepth:
     def occluded(self, box: Box) -> bool:
         """Whether something stands before the target: many pixels of the box are nearer than its front."""
         depths = self._sample(box)
-        if depths is None or self._relief is None:
-            return False
-        nearest = self._nearer(self._relief * self._distance - self._moved)
-        return np.mean(depths < nearest) > self._parameters.depth_front
+        return depths is not None and np.mean(depths < self._nearest) > self._parameters.depth_front
+
+    def uncovered(self, points: np.ndarray) -> np.ndarray:
+        """Return the points (N, 2) [pixel] that nothing stood before in the frame before this one."""
+        if self._before is None:
+            return points
+        height, width = self._before.shape
+        columns = np.clip(points[:, 0].astype(int), 0, width - 1)
+        rows = np.clip(points[:, 1].astype(int), 0, height - 1)
+        depths = self._before[rows, columns]
+        return points[~((depths > 0.0) & (depths < self._nearest))]
 
     def follow(self, box: Box, trusted: bool) -> None:
         """Take in where the target is.
@@ -154,6 +162,11 @@ class TargetDepth:
     def _moved(self) -> float:
         """Most that the target's distance can have changed since it was last measured [m]."""
         return self._age * self._parameters.depth_motion
+
+    @property
+    def _nearest(self) -> float:
+        """What is nearer than this is not the target but stands before it [m]."""
+        return 0.0 if self._relief is None else self._nearer(self._relief * self._distance - self._moved)
 
     def _nearer(self, depth: float) -> float:
         """Return what stereo may measure at least where the depth is so much [m]."""

@@ -59,6 +59,8 @@ def track(
     -------
     The flow, or None if too few points were found or their median error exceeds `max_fb_error`.
     """
+    if len(points) < MIN_POINTS:
+        return None
     side = np.sqrt(box.area)
     # A large target is tracked on a smaller octave: the same points, a wider reach, bounded cost.
     octave = max(0, int(np.floor(np.log2(side / parameters.flow_side))))

@@ -254,6 +254,7 @@ class Tracker:
             points = self._sift.flow_points(previous, box, side)
         else:
             points = keypoints.grid(box, side)
+        points = self._depth.uncovered(points)
         flow = median_flow.track(previous, frame, box, points, self._parameters)
         fast = np.hypot(*self._velocity) > FAST * np.sqrt(box.area)
         if fast and (flow is None or flow.residual > self._parameters.max_residual):
