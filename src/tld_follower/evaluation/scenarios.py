@@ -53,9 +53,9 @@ OCCLUSION = Scenario(
     "occlusion",
     box_at=4.0,
     start=6.0,
-    halt=22.0,
-    end=26.0,
-    drive=((16.0, 1.0, 0.0),),
+    halt=26.0,
+    end=30.0,
+    drive=((20.0, 1.0, 0.0),),
     world="occlusion.world",
 )
 
