@@ -123,7 +123,7 @@ class DepthTest(unittest.TestCase):
 
     def test_clouds_that_are_none_are_named_and_hold_nothing_up(self):
         for bad, reason in (
-            (lambda stamp: cloud(1.0, stamp, 2 * WIDTH, HEIGHT), "640x240 points"),
+            (lambda stamp: cloud(1.0, stamp, 2 * WIDTH, HEIGHT), "640x240 pixels"),
             (lambda stamp: PointCloud2(header=cloud(1.0, stamp).header), "point cloud without"),
         ):
             stamp = self.shoot()
@@ -135,7 +135,7 @@ class DepthTest(unittest.TestCase):
         """One wait in ROS time, then none until a cloud comes: here time stands still."""
         stamp = self.shoot()
         self.assertTrue(self.box_as_time_passes(stamp).visible)
-        self.wait(lambda: any("going on without depth" in line for line in self.log), "a warning")
+        self.wait(lambda: any("no point cloud for an image" in line for line in self.log), "a warning")
         for _ in range(3):
             self.assertTrue(self.box(self.shoot()).visible)
         self.clouds.publish(cloud(TARGET_DEPTH, self.time))

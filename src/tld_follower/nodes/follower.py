@@ -9,7 +9,7 @@ from sensor_msgs.msg import PointCloud2
 from tld_follower.following.follower import Follower
 from tld_follower.following.parameters import Parameters
 from tld_follower.msg import BoundingBoxStamped, FollowState
-from tld_follower.nodes.clouds import Clouds
+from tld_follower.nodes.by_stamp import ByStamp
 from tld_follower.nodes.conversions import cloud_points, message_box
 from tld_follower.nodes.newest import Newest
 from tld_follower.nodes.settings import fatal_if_wrong
@@ -34,7 +34,7 @@ class FollowerNode:
         self._parameters = Parameters.from_dict(rospy.get_param("~", {}))
         self._follower = Follower(self._parameters)
         self._boxes = Newest()
-        self._clouds = Clouds(self._parameters.max_age)
+        self._clouds = ByStamp(self._parameters.max_age)
         self._stamp = rospy.Time()
         self._mode = None
         self._starved = False

@@ -10,7 +10,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from tld_follower.box import Box
 from tld_follower.msg import BoundingBox
-from tld_follower.nodes.clouds import Clouds
+from tld_follower.nodes.by_stamp import ByStamp
 from tld_follower.nodes.conversions import box_message, cloud_points, grey_image, image_array
 from tld_follower.nodes.newest import Newest
 from tld_follower.nodes.requests import Requests
@@ -72,8 +72,8 @@ class TrackerNode:
         self._requests = Requests(self._work.wake)
         self._every_frame = every_frame
         self._request_lock = threading.Lock()
-        self._clouds = Clouds(PAIR_AGE) if use_depth else None
-        self._rights = Clouds(PAIR_AGE) if use_right else None
+        self._clouds = ByStamp(PAIR_AGE) if use_depth else None
+        self._rights = ByStamp(PAIR_AGE) if use_right else None
         self._image = None
         self._depth = None
         self._right = None

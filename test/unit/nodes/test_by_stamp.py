@@ -4,7 +4,7 @@ import pytest
 import rospy
 from sensor_msgs.msg import PointCloud2
 
-from tld_follower.nodes.clouds import Clouds
+from tld_follower.nodes.by_stamp import ByStamp
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ class Ticking:
 
 
 def test_the_cloud_of_a_stamp_and_no_other(clock):
-    clouds = Clouds(max_age=0.5)
+    clouds = ByStamp(max_age=0.5)
     clouds.put(cloud(99.9))
     clouds.put(cloud(100.0))
     assert wait(clouds, 99.9).header.stamp.to_sec() == 99.9
@@ -48,7 +48,7 @@ def test_the_cloud_of_a_stamp_and_no_other(clock):
 
 
 def test_a_cloud_that_comes_later_is_waited_for_while_time_stands_still(clock):
-    clouds = Clouds(max_age=0.5)
+    clouds = ByStamp(max_age=0.5)
     coming = threading.Timer(0.2, clouds.put, [cloud(100.0)])
     coming.start()
     assert wait(clouds, 100.0) is not None
@@ -56,7 +56,7 @@ def test_a_cloud_that_comes_later_is_waited_for_while_time_stands_still(clock):
 
 
 def test_a_wait_ends_in_ros_time_and_is_not_repeated_before_a_cloud_comes(clock):
-    clouds, asking = Clouds(max_age=0.5), Ticking(clock)
+    clouds, asking = ByStamp(max_age=0.5), Ticking(clock)
     assert wait(clouds, 100.0, asking) is None
     assert asking.asked == 2
     assert wait(clouds, 100.3, asking) is None
@@ -67,25 +67,25 @@ def test_a_wait_ends_in_ros_time_and_is_not_repeated_before_a_cloud_comes(clock)
 
 
 def test_newer_work_ends_a_wait(clock):
-    assert wait(Clouds(max_age=0.5), 100.0, lambda: True) is None
+    assert wait(ByStamp(max_age=0.5), 100.0, lambda: True) is None
 
 
 def test_a_cloud_that_was_passed_over_is_not_waited_for(clock):
-    clouds, asking = Clouds(max_age=0.5), Ticking(clock)
+    clouds, asking = ByStamp(max_age=0.5), Ticking(clock)
     clouds.put(cloud(100.1))
     assert wait(clouds, 100.0, asking) is None
     assert asking.asked == 0
 
 
 def test_old_clouds_are_forgotten(clock):
-    clouds = Clouds(max_age=0.5)
+    clouds = ByStamp(max_age=0.5)
     clouds.put(cloud(99.0))
     clouds.put(cloud(100.0))
     assert wait(clouds, 99.0) is None
 
 
 def test_clouds_from_before_a_jump_back_are_dropped(clock):
-    clouds = Clouds(max_age=0.5)
+    clouds = ByStamp(max_age=0.5)
     clouds.put(cloud(100.0))
     assert wait(clouds, 100.0) is not None
     assert wait(clouds, 10.0, Ticking(clock)) is None
