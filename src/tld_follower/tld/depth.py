@@ -77,6 +77,10 @@ class TargetDepth:
         self._before, self._depth = self._depth, depth
         self._age += 1
 
+    def leave_view(self) -> None:
+        """Forget the last depth map: the next image is another camera's."""
+        self._depth = None
+
     def agrees(self, box: Box) -> bool:
         """Whether a box may be the target: False if hardly any of its middle lies where the target must be.
 

@@ -240,6 +240,7 @@ class Tracker:
         shift : by which the target lies further right there [pixel].
         """
         self._frame = Frame(image, self._parameters.blur)
+        self._depth.leave_view()
         moved = replace(self.box, x=self.box.x + shift)
         self._box = moved if self.tracking else None
         self._last_box = replace(self._last_box, x=self._last_box.x + shift)

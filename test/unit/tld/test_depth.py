@@ -175,6 +175,21 @@ def test_sparse_depth_says_nothing():
     assert not target.occluded(TARGET)
 
 
+def test_points_on_what_stands_before_the_target_are_left_out():
+    target = seen()
+    cover = Box(TARGET.x, TARGET.y, 10.0, TARGET.height)
+    covered, free, outside = [65.0, 50.0], [90.0, 50.0], [500.0, -20.0]
+    points = np.array([covered, free, outside], np.float32)
+    look(target, scene((TARGET, 2.0), (cover, 1.0)))
+    np.testing.assert_array_equal(target.uncovered(points), points)  # they lie in the frame before
+    look(target, scene((TARGET, 2.0)))
+    np.testing.assert_array_equal(target.uncovered(points), points[1:])
+    look(target, scene((TARGET, 2.0), (cover, 1.0)))
+    target.leave_view()
+    look(target, None)
+    np.testing.assert_array_equal(target.uncovered(points), points)
+
+
 @pytest.mark.parametrize("depth", [np.ones((60, 80), np.float32), np.ones((HEIGHT, WIDTH), np.uint16)])
 def test_a_map_of_another_kind_is_refused(depth):
     target = seen()
