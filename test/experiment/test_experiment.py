@@ -59,6 +59,21 @@ def test_plots_and_video_are_written(results):
     assert video.read()[0]
 
 
+def test_with_depth_the_target_is_followed_past_what_passes_before_it(tmp_path):
+    path = tmp_path / "occlusion.json"
+    done = run("occlusion", "--use-depth", "--first-seed", 1, "--resolution", "320x240", "--json", path)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(path.read_text())
+    assert (result["use_depth"], result["world"]) == (True, "occlusion.world")
+    (flight,) = result["runs"]
+    assert flight["visible_fraction"] < 0.95  # the target was hidden
+    assert flight["tracked_fraction"] > 0.85
+    assert flight["wrong_boxes"] < 10
+    assert flight["boxes_while_hidden"] == 0
+    assert flight["recoveries"] == flight["losses"]
+    assert flight["trace"]["distance"][-1] < 1.2
+
+
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
