@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Learning is switched between frames, and a model that was saved finds its target again."""
+"""Learning is switched between frames, a saved model finds its target again, and one camera will do."""
 
 import os
 import sys
@@ -9,6 +9,7 @@ import unittest
 
 import numpy as np
 import rospy
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import Image, RegionOfInterest
 from std_srvs.srv import SetBool
 
@@ -46,12 +47,16 @@ class ModelTest(unittest.TestCase):
         cls.stamp = rospy.Time(10)
         rospy.Subscriber("/pointA", BoundingBox, cls.note)
         rospy.Subscriber("/NODE/target", RegionOfInterest, cls.count)
+        cls.warnings = []
+        rospy.Subscriber("/rosout", Log, cls.read)
         cls.camera = rospy.Publisher("/stereo/left/image_raw", Image, queue_size=1)
+        cls.right = rospy.Publisher("/stereo/right/image_raw", Image, queue_size=1)
         cls.init = rospy.Publisher("/NODE/init", RegionOfInterest, queue_size=1)
         me = rospy.get_name()
         wait_for_edges(
             {
                 (me, "/stereo/left/image_raw", "/NODE"),
+                (me, "/stereo/right/image_raw", "/NODE"),
                 (me, "/NODE/init", "/NODE"),
                 ("/NODE", "/pointA", me),
                 ("/NODE", "/NODE/target", me),
@@ -76,12 +81,30 @@ class ModelTest(unittest.TestCase):
             cls.targets += 1
             cls.changed.notify_all()
 
-    def show(self, picture):
-        """Publish an image; return the tracker's answer."""
+    @classmethod
+    def read(cls, log):
+        with cls.changed:
+            if log.name == "/NODE" and log.level >= Log.WARN:
+                cls.warnings.append(log.msg)
+                cls.changed.notify_all()
+
+    def said(self, words):
+        """Wait until the tracker has warned with these words."""
+        with self.changed:
+            said = self.changed.wait_for(lambda: any(words in text for text in self.warnings), WAIT)
+        self.assertTrue(said, f"'{words}' not in {self.warnings}")
+
+    def show(self, picture, right=None, late=0.0):
+        """Publish an image, and one of the right camera that is `late` [s]; return the tracker's answer."""
         type(self).stamp += rospy.Duration(1, 0) / 30
-        message = Image(height=picture.shape[0], width=picture.shape[1], encoding="mono8")
-        message.header.stamp, message.step, message.data = self.stamp, picture.shape[1], picture.tobytes()
-        self.camera.publish(message)
+        for camera, pixels, stamp in (
+            (self.right, right, self.stamp + rospy.Duration.from_sec(late)),
+            (self.camera, picture, self.stamp),
+        ):
+            if pixels is not None:
+                message = Image(height=pixels.shape[0], width=pixels.shape[1], encoding="mono8")
+                message.header.stamp, message.step, message.data = stamp, pixels.shape[1], pixels.tobytes()
+                camera.publish(message)
         with self.changed:
             self.assertTrue(self.changed.wait_for(lambda: self.stamp in self.boxes, WAIT), "no box")
             return self.boxes[self.stamp]
@@ -162,6 +185,20 @@ class ModelTest(unittest.TestCase):
         self.assertFalse(answer.success)
         self.assertIn("320x240, the camera gives 200x140", answer.message)
         self.assertTrue(self.show(scene(TARGET)).visible)
+
+    def test_a_right_camera_that_is_dead_late_or_broken(self):
+        aside = Box(TARGET.x - 12, *TARGET.as_tuple()[1:])
+        self.assertTrue(self.show(scene(TARGET), scene(aside)).visible)
+        self.assertTrue(self.show(scene(TARGET)).visible)
+        self.said("no right image for an image: going on without")
+        late = self.show(scene(TARGET), scene(aside), 0.001)
+        self.assertTrue(late.visible)
+        self.assertTrue(self.show(scene(TARGET), scene(aside)[:100, :100]).visible)
+        self.said("right image ignored: 100x100 pixels for an image of 320x240")
+        for step in range(20):
+            moved = Box(TARGET.x + 6 * step, *TARGET.as_tuple()[1:])
+            box = self.show(scene(moved), scene(Box(moved.x - 12, *moved.as_tuple()[1:])))
+            self.assertGreater(message_box(box).overlap(moved), 0.7)
 
 
 if __name__ == "__main__":

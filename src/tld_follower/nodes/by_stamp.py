@@ -1,8 +1,12 @@
 """Pairs the messages of one topic with those of another by their stamps."""
 
 import threading
+import time
 
 import rospy
+
+# ROS time itself may stand still, as when a bag has come to its end [s of wall-clock time].
+STANDSTILL = 10.0
 
 
 class ByStamp:
@@ -38,17 +42,17 @@ class ByStamp:
         stamp : rospy.Time
             One before that of the last call means that time has jumped back: later messages are dropped.
         patience : float
-            Seconds of ROS time.
+            Seconds of ROS time; at most `STANDSTILL` of wall-clock time.
         superseded : callable
             True when there is newer work, which ends the wait.
         """
-        deadline = rospy.Time.now() + rospy.Duration(patience)
+        deadline, given_up = rospy.Time.now() + rospy.Duration(patience), time.monotonic() + STANDSTILL
         with self._changed:
             if stamp < self._stamp:
                 self._recent = {at: kept for at, kept in self._recent.items() if at <= stamp}
             self._stamp = stamp
             while self._expected(stamp) and not superseded():
-                if rospy.Time.now() >= deadline or rospy.is_shutdown():
+                if rospy.Time.now() >= deadline or time.monotonic() >= given_up or rospy.is_shutdown():
                     break
                 self._changed.wait(0.02)
             self._silent = stamp not in self._recent and not self._passed(stamp)

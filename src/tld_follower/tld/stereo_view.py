@@ -22,7 +22,7 @@ from tld_follower.tld.frame import to_gray
 from tld_follower.tld.tracker import Result, Tracker
 
 # Share of the target's area that the right image must show beyond the left one's to take over.
-MARGIN = 0.05
+MARGIN = 0.02
 # The part of a box, about its centre, that is compared between both images, and how much of it must be seen.
 CENTER = 0.8
 LEAST_SEEN = 0.7

@@ -231,3 +231,28 @@ def test_the_config_file_gives_the_defaults():
     values = yaml.safe_load(config.read_text())
     assert Parameters.from_dict(values) == Parameters()
     assert set(values) == set(Parameters.__dataclass_fields__)
+
+
+@pytest.mark.parametrize("x", [290.0, 321.0, 500.0, 1e6])
+@pytest.mark.parametrize("distance", [0.8, 3.0])
+def test_a_box_that_leaves_the_image_at_the_right_turns_right(x, distance):
+    """The right camera may still see what has left the left image."""
+    box = Box(x, 95, 60, 50)
+    state = step(Follower(PARAMETERS), box=box, cloud=scene(1.0, background=distance))
+    assert state.command.yaw < -0.9
+    assert state.command.yaw >= -PARAMETERS.max_yaw_rate
+
+
+@pytest.mark.parametrize("box", [Box(321, 95, 60, 50), Box(-70, 95, 60, 50), Box(130, 245, 60, 50)], ids=str)
+def test_without_points_inside_the_box_it_does_not_fly_forward(box):
+    state = step(Follower(PARAMETERS), box=box, cloud=scene(3.0))
+    assert math.isnan(state.distance)
+    assert state.reason == "no depth inside the box"
+    assert state.command.x == 0.0
+
+
+def test_what_still_shows_of_a_box_gives_its_distance():
+    cloud = scene(3.0)
+    cloud[80:160, 300:, 2] = 1.2
+    state = step(Follower(PARAMETERS), box=Box(302, 95, 60, 50), cloud=cloud)
+    assert state.distance == pytest.approx(1.2, abs=0.01)

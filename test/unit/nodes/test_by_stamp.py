@@ -4,6 +4,7 @@ import pytest
 import rospy
 from sensor_msgs.msg import PointCloud2
 
+from tld_follower.nodes import by_stamp
 from tld_follower.nodes.by_stamp import ByStamp
 
 
@@ -92,3 +93,8 @@ def test_clouds_from_before_a_jump_back_are_dropped(clock):
     assert clouds.newest is None
     clouds.put(cloud(10.1))
     assert wait(clouds, 10.1) is not None
+
+
+def test_a_wait_ends_even_if_ros_time_stands_still(clock, monkeypatch):
+    monkeypatch.setattr(by_stamp, "STANDSTILL", 0.01)
+    assert wait(ByStamp(max_age=0.5), 100.0) is None
