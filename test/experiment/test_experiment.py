@@ -5,7 +5,12 @@ import subprocess
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
+
+from tld_follower.evaluation import sequences
+from tld_follower.evaluation.fastboard import FASTBOARD, FRAMES
+from tld_follower.evaluation.shooting import shoot
 
 EXPERIMENT = Path(__file__).resolve().parents[2] / "scripts" / "experiment"
 
@@ -72,6 +77,61 @@ def test_with_depth_the_target_is_followed_past_what_passes_before_it(tmp_path):
     assert flight["boxes_while_hidden"] == 0
     assert flight["recoveries"] == flight["losses"]
     assert flight["trace"]["distance"][-1] < 1.2
+
+
+@pytest.fixture(scope="module")
+def films(tmp_path_factory):
+    """One seed of fastboard: filmed on the whole graph, and by the simulator alone."""
+    folder = tmp_path_factory.mktemp("films")
+    size, scores = "320x240", folder / "flight.json"
+    done = run("fastboard", "--resolution", size, "--film", folder / "graph", "--json", scores)
+    assert done.returncode == 0, done.stderr
+    shoot(FASTBOARD, [0], folder / "alone", size)
+    return folder / "graph" / "fastboard-0", folder / "alone" / "fastboard-0", json.loads(scores.read_text())
+
+
+def test_a_film_is_the_same_whoever_watches(films):
+    graph, alone, _ = films
+    assert (graph / "groundtruth.txt").read_text() == (alone / "groundtruth.txt").read_text()
+    pictures = sorted(path.name for path in (graph / "img").iterdir())
+    assert pictures == [f"{number:05d}.png" for number in range(1, FRAMES + 1)]
+    for name in pictures:
+        assert (graph / "img" / name).read_bytes() == (alone / "img" / name).read_bytes(), name
+
+
+def test_fastboard_comes_and_goes_as_in_the_thesis(films):
+    shown = np.array([box is not None for box in sequences.load(films[0]).truth])
+    assert np.flatnonzero(~shown)[0] in (4, 5, 6)
+    assert 120 < shown.sum() < 155
+    assert (shown[1:] & ~shown[:-1]).sum() == 3
+
+
+def test_boxes_and_pictures_of_a_film_belong_together(films):
+    film = sequences.load(films[0])
+    checked = 0
+    for box, image in zip(film.truth, film.frames(), strict=True):
+        if box is None or box.x < 1 or box.right > image.shape[1] - 1:
+            continue
+        hue, saturation, value = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2HSV))
+        # Husky's shell is the only thing that yellow; the camera pans by 8 pixels a frame and more.
+        shell = (abs(hue.astype(int) - 24) < 4) & (saturation > 180) & (value > 110)
+        rows, columns = np.nonzero(shell)
+        near = (columns > box.x - 30) & (columns < box.right + 30)
+        assert columns[near].min() >= box.x
+        assert columns[near].max() < box.right
+        assert rows[near].min() >= box.y
+        # The shell is nearly as wide as the target.
+        assert np.ptp(columns[near]) > 0.7 * box.width
+        checked += 1
+    assert checked > 40
+
+
+def test_a_scripted_flight_has_no_figures_of_following(films):
+    (flown,) = films[2]["runs"]
+    assert flown["peak_gap_m"] is None
+    assert flown["reentries"] == 3
+    assert 0 <= flown["failures"] <= 2
+    assert flown["collisions"] == 0
 
 
 @pytest.mark.parametrize(

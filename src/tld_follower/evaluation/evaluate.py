@@ -15,6 +15,7 @@ import numpy as np
 
 from tld_follower.box import Box
 from tld_follower.evaluation import report, scoring, sequences
+from tld_follower.evaluation.thesis import is_fastboard
 from tld_follower.tld.parameters import TRACKERS, Parameters
 from tld_follower.tld.tracker import Tracker, warm_up
 
@@ -70,6 +71,42 @@ def run(sequence: sequences.Sequence, parameters: Parameters, seed: int) -> Run:
     return Run(sequence, parameters.tracker, boxes, np.array(times), tracker.templates)
 
 
+def run_all(chosen: list[sequences.Sequence], trackers: list[Parameters], seed: int) -> list[Run]:
+    """Run every tracker over every sequence.
+
+    Raises
+    ------
+    SequenceError
+        For a sequence that a tracker cannot be run on.
+    """
+    runs = []
+    for sequence in chosen:
+        for parameters in trackers:
+            _tell(f"evaluate: {sequence.name}, {parameters.tracker}, {len(sequence.truth)} frames")
+            try:
+                runs.append(run(sequence, parameters, seed))
+            except ValueError as error:
+                raise sequences.SequenceError(f"{sequence.name}: {error}") from error
+    return runs
+
+
+def film_fastboard(arguments: argparse.Namespace) -> list[sequences.Sequence]:
+    """Film the scenario fastboard for the report."""
+    # Only here the ROS graph is needed.
+    from tld_follower.evaluation.fastboard import FASTBOARD
+    from tld_follower.evaluation.shooting import shoot
+
+    _tell(f"evaluate: filming fastboard, {arguments.fastboard} films")
+    folders = shoot(FASTBOARD, range(arguments.fastboard), arguments.report / "fastboard")
+    return [sequences.load(folder) for folder in folders]
+
+
+def _wants_films(arguments: argparse.Namespace, selected: list[sequences.Sequence]) -> bool:
+    given = any(is_fastboard(sequence.name) for sequence in selected)
+    both = set(arguments.tracker) == set(TRACKERS)
+    return both and arguments.fastboard > 0 and not arguments.clips and not given
+
+
 def parse_settings(settings: list[str]) -> dict[str, Any]:
     """Turn NAME=VALUE strings into parameters, each of the type of its default.
 
@@ -101,7 +138,7 @@ def _parse_bool(text: str) -> bool:
     return text.lower() == "true"
 
 
-def _seed(text: str) -> int:
+def _natural(text: str) -> int:
     value = int(text)
     if value < 0:
         raise argparse.ArgumentTypeError(f"{text} is not 0 or more")
@@ -118,9 +155,16 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help="change a parameter"
     )
-    parser.add_argument("--seed", type=_seed, default=0, help="seed of the tracker (0)")
+    parser.add_argument("--seed", type=_natural, default=0, help="seed of the tracker (0)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the scores")
-    parser.add_argument("--report", type=Path, metavar="DIR", help="write tables, plot and contact sheets")
+    parser.add_argument("--report", type=Path, metavar="DIR", help="write a page of tables and pictures")
+    parser.add_argument(
+        "--fastboard",
+        type=_natural,
+        default=10,
+        metavar="N",
+        help="films of fastboard to make for a report of both trackers, if none is given; 0: none (10)",
+    )
     return parser
 
 
@@ -144,19 +188,19 @@ def main(argv: list[str] | None = None) -> int:
             selected = sequences.load_clips(arguments.clips, selected)
         _tell("evaluate: compiling")
         warm_up()
-        runs = []
-        for sequence in selected:
-            for parameters in chosen:
-                _tell(f"evaluate: {sequence.name}, {parameters.tracker}, {len(sequence.truth)} frames")
-                try:
-                    runs.append(run(sequence, parameters, arguments.seed))
-                except ValueError as error:
-                    raise sequences.SequenceError(f"{sequence.name}: {error}") from error
+        runs = run_all(selected, chosen, arguments.seed)
         results = [one.scores() for one in runs]
+        films, missing = [], ""
         if arguments.json:
             arguments.json.write_text(json.dumps(results, indent=2) + "\n")
         if arguments.report:
-            report.write(arguments.report, runs, results)
+            if _wants_films(arguments, selected):
+                try:
+                    films = run_all(film_fastboard(arguments), chosen, arguments.seed)
+                except (ImportError, sequences.SequenceError) as error:
+                    missing = f"not measured: {error}"
+                    _tell(f"evaluate: fastboard is {missing}")
+            report.write(arguments.report, runs, results, films, missing)
     except (sequences.SequenceError, ValueError, OSError) as error:
         _tell(f"evaluate: {error}")
         return 1

@@ -14,11 +14,14 @@ from pathlib import Path
 import rospy
 
 from tld_follower.evaluation import graph, plots
+from tld_follower.evaluation.fastboard import FASTBOARD
 from tld_follower.evaluation.film import Film
 from tld_follower.evaluation.flight import Flight
 from tld_follower.evaluation.metrics import flight_figures
-from tld_follower.evaluation.scenarios import SCENARIOS
+from tld_follower.evaluation.scenarios import OCCLUSION, STRAIGHT
+from tld_follower.evaluation.stage import simulation_arguments
 
+SCENARIOS = {scenario.name: scenario for scenario in (STRAIGHT, OCCLUSION, FASTBOARD)}
 FRAME_RATE = 30.0
 COLUMNS = (
     ("seed", "seed", "{:d}"),
@@ -33,6 +36,9 @@ COLUMNS = (
     ("mean_overlap", "overlap", "{:.2f}"),
     ("wrong_boxes", "wrong boxes", "{:d}"),
     ("boxes_while_hidden", "while hidden", "{:d}"),
+    ("reentries", "re-entries", "{:d}"),
+    ("reentries_found", "found", "{:d}"),
+    ("failures", "failures", "{:d}"),
     ("losses", "losses", "{:d}"),
     ("real_time_factor", "real time", "{:.2f}x"),
 )
@@ -91,23 +97,15 @@ def parse_arguments(argv):
 
 def launch_arguments(settings, scenario, seed):
     """Arguments of follow.launch for one run."""
-    arguments = {
-        "mode": "lockstep",
-        "lockstep_target": "true",
-        "lockstep_timeout": "30",
-        "paused": "true",
-        "resolution": settings.resolution,
-        "image_noise": settings.image_noise,
-        "seed": seed,
-        "spiri_pose": ",".join(f"{value:.6f}" for value in scenario.spiri_pose(seed)),
+    return {
+        **simulation_arguments(scenario, seed, settings.resolution, settings.image_noise, settings.world),
         "distance": settings.distance,
         "control": settings.control,
         "max_speed": settings.max_speed,
         "tracker": settings.tracker,
         "use_depth": str(settings.use_depth).lower(),
+        "commands": "/pointsdepthA/cmd_vel" if scenario.scripted else "/cmd_vel",
     }
-    arguments["world"] = settings.world.resolve() if settings.world else graph.world_file(scenario.world)
-    return arguments
 
 
 def fly(settings, seed, logs, video_path):
@@ -129,7 +127,7 @@ def fly(settings, seed, logs, video_path):
         alive = stack.enter_context(graph.launched("follow.launch", arguments, log))
         flight.wait_until_connected(alive, settings.use_depth)
         trace, real_time_factor = flight.fly(alive)
-    figures = flight_figures(trace, scenario.halt - scenario.start)
+    figures = flight_figures(trace, None if scenario.scripted else scenario.halt - scenario.start)
     return {"seed": seed, **figures, "real_time_factor": real_time_factor, "trace": trace}
 
 

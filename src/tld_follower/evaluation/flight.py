@@ -7,7 +7,7 @@ import time
 import rospy
 from sensor_msgs.msg import RegionOfInterest
 
-from tld_follower.evaluation.graph import DEPTH_EDGE, FLYING_EDGES, GraphError
+from tld_follower.evaluation.graph import COMMAND_EDGE, DEPTH_EDGE, FLYING_EDGES, GraphError
 from tld_follower.evaluation.stage import FRAME_TIMEOUT, Stage
 from tld_follower.nodes.conversions import message_box
 
@@ -54,7 +54,8 @@ class Flight:
     def wait_until_connected(self, alive=lambda: None, use_depth=False):
         """Wait for every edge of the graph, the tracker's clouds with `use_depth`, and this flight's own."""
         me = rospy.get_name()
-        edges = FLYING_EDGES | {(me, "/NODE/init", "/NODE"), ("/NODE", "/NODE/target", me)}
+        edges = FLYING_EDGES - {COMMAND_EDGE} if self._scenario.scripted else FLYING_EDGES
+        edges |= {(me, "/NODE/init", "/NODE"), ("/NODE", "/NODE/target", me)}
         self._stage.wait_until_connected(edges | {DEPTH_EDGE} if use_depth else edges, alive)
 
     def fly(self, alive=lambda: None):

@@ -30,6 +30,8 @@ FLYING_EDGES = frozenset(
     }
     | {("/gazebo", topic, "/stereo/stereo_image_proc") for topic in _CAMERAS}
 )
+# The one that a scenario does without when a script flies the drone.
+COMMAND_EDGE = ("/pointsdepthA", "/cmd_vel", "/gazebo")
 # The one more with use_depth.
 DEPTH_EDGE = ("/stereo/stereo_image_proc", "/stereo/points2", "/NODE")
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from tld_follower.box import Box
+from tld_follower.evaluation import thesis
+from tld_follower.evaluation.page import Page, write_table
 from tld_follower.evaluation.scoring import frame_overlap
 
 if TYPE_CHECKING:
@@ -27,6 +29,7 @@ HEADER = (
 SHEET_COLUMNS, SHEET_ROWS = 6, 4
 TILE_WIDTH = 240
 TRUE_COLOR, FOUND_COLOR = (0, 255, 0), (0, 0, 255)
+LINE_STYLES = {"tld": "--", "tld_sift": "-"}
 SUCCESS_OVERLAPS = np.linspace(0.0, 1.0, 51)
 
 
@@ -80,8 +83,19 @@ def text_table(results: list[dict]) -> str:
     return "\n".join(lines)
 
 
-def write(directory: Path, runs: list[Run], results: list[dict]) -> None:
-    """Write scores.csv, scores.md, success.png and one contact sheet a run into a directory.
+def write(
+    directory: Path, runs: list[Run], results: list[dict], films: Sequence[Run] = (), missing: str = ""
+) -> None:
+    """Write the page report.html with all that it shows beside it.
+
+    These are the tables scores, table_4_1 and table_4_2 (CSV and Markdown), success.png, failures.png if
+    there is a film of fastboard, and a contact sheet a run (of the films: of the first one).
+
+    Parameters
+    ----------
+    runs, results : what was asked for, and its scores.
+    films : runs on films of fastboard that were made for this report.
+    missing : why there are no such films, if they should be there.
 
     Raises
     ------
@@ -89,16 +103,49 @@ def write(directory: Path, runs: list[Run], results: list[dict]) -> None:
         If a file cannot be written.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    table = rows(results)
-    with (directory / "scores.csv").open("w", newline="") as file:
-        csv.writer(file).writerows([HEADER, *table])
-    lines = [" | ".join(row) for row in [HEADER, ["---"] * len(HEADER), *table]]
-    (directory / "scores.md").write_text("".join(f"| {line} |\n" for line in lines))
+    page = Page("Evaluation of the tracker")
+    scores = [list(HEADER), *rows(results)]
+    write_table(directory / "scores", scores)
+    page.heading("Scores")
+    page.table(scores)
+    page.text(
+        "P25, R25, F25, F50: precision, recall, F at an overlap above 0.25, 0.5; boxes: in absent frames."
+    )
+    _write_thesis(directory, page, [*results, *(film.scores() for film in films)], missing)
+    page.heading("Overlap")
     _write_success_plot(directory / "success.png", runs)
-    for run in runs:
-        path = directory / f"{run.sequence.name}_{run.tracker}.png"
-        if not cv2.imwrite(str(path), contact_sheet(run)):
-            raise OSError(f"{path}: cannot be written")
+    page.picture(
+        "success.png", "Share of the frames with the target in view whose overlap exceeds the threshold"
+    )
+    page.heading("What was seen")
+    first_film = [film for film in films if film.sequence.name == films[0].sequence.name]
+    for run in [*runs, *first_film]:
+        name = f"{run.sequence.name}_{run.tracker}.png"
+        if not cv2.imwrite(str(directory / name), contact_sheet(run)):
+            raise OSError(f"{directory / name}: cannot be written")
+        page.picture(name, f"{run.sequence.name}, {run.tracker}: true boxes green, found ones red")
+    page.write(directory / "report.html")
+
+
+def _write_thesis(directory: Path, page: Page, results: list[dict], missing: str) -> None:
+    """Write the thesis' tables and figure of results that belong to its sequences."""
+    for name, title, table in (
+        ("table_4_1", "Thesis table 4.1: true positives", thesis.table_counts(results)),
+        ("table_4_2", "Thesis table 4.2: precision, recall and F [%]", thesis.table_scores(results)),
+    ):
+        write_table(directory / name, table)
+        page.heading(title)
+        page.table(table)
+    page.notes(thesis.NOTES)
+    page.heading("Thesis figure 4.8: failures on fastboard")
+    if any(thesis.is_fastboard(result["sequence"]) for result in results):
+        thesis.plot_failures(results, directory / "failures.png")
+        page.picture("failures.png", "Mean of the films; each dot is one film")
+        page.text(
+            "The thesis prints no numbers with its figure 4.8; its tables have what it found on fastboard."
+        )
+    else:
+        page.text(missing or "Not measured: it needs both trackers and films of fastboard.")
 
 
 def success(run: Run) -> np.ndarray:
@@ -109,14 +156,23 @@ def success(run: Run) -> np.ndarray:
 
 
 def _write_success_plot(path: Path, runs: list[Run]) -> None:
-    figure, axes = plt.subplots(figsize=(7.0, 5.0))
+    """Plot a colour a sequence, a line style a tracker."""
+    names = list(dict.fromkeys(run.sequence.name for run in runs))
+    colours = dict(zip(names, plt.get_cmap("turbo")(np.linspace(0.05, 0.95, len(names))), strict=True))
+    figure, axes = plt.subplots(figsize=(9.0, 5.0))
     for run in runs:
-        axes.plot(SUCCESS_OVERLAPS, success(run), label=f"{run.sequence.name}, {run.tracker}")
+        axes.plot(
+            SUCCESS_OVERLAPS,
+            success(run),
+            color=colours[run.sequence.name],
+            linestyle=LINE_STYLES[run.tracker],
+            label=f"{run.sequence.name}, {run.tracker}",
+        )
     axes.set(
         xlabel="overlap threshold", ylabel="share of frames with the target", xlim=(0, 1), ylim=(0, 1.02)
     )
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
     figure.savefig(path, dpi=110, bbox_inches="tight")
     plt.close(figure)
 

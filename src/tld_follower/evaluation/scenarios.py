@@ -20,7 +20,7 @@ class Scenario:
     drive: tuple[tuple[float, float, float], ...]  # from start to halt: s, m/s forward, rad/s to the left
     world: str = "testing_grounds.world"
 
-    scripted = False  # the follower flies the drone
+    scripted = False  # the follower flies the drone, not a script
 
     def target_command(self, t, _seed):
         """Speed in m/s and turn rate in rad/s that Husky is commanded at time `t`."""
@@ -41,6 +41,10 @@ class Scenario:
             x, y, yaw = (x, y, yaw) + np.random.default_rng(seed).uniform(-1, 1, 3) * (0.05, 0.15, 0.05)
         return float(x), float(y), float(yaw)
 
+    def husky_pose(self, _seed):
+        """Start pose x, y in m and yaw in rad; empty for the world's."""
+        return ()
+
 
 # 1 m from the left camera to Husky's rear at hover height, with Husky at the origin facing +x.
 SPIRI_START = (-1.5, 0.0, 0.0)
@@ -58,5 +62,3 @@ OCCLUSION = Scenario(
     drive=((20.0, 1.0, 0.0),),
     world="occlusion.world",
 )
-
-SCENARIOS = {scenario.name: scenario for scenario in (STRAIGHT, OCCLUSION)}

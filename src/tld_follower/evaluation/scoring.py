@@ -76,17 +76,34 @@ def count(truth: Boxes, found: Boxes, min_overlap: float) -> Counts:
     return Counts(tp, fp, fn, tn)
 
 
-def reentries(truth: Boxes) -> list[int]:
-    """Return the indices of the frames where the target comes into view again."""
-    return [i for i in range(1, len(truth)) if truth[i] is not None and truth[i - 1] is None]
+def recoveries(in_view: Sequence[bool], overlaps: Sequence[float]) -> dict[str, int]:
+    """Count how often the target comes back, and is found again.
 
+    A re-entry is found if the overlap exceeds 0.25 within 25 frames of it. It is a failure, as in the thesis'
+    figure 4.8, if it does not for over 5 s: 150 frames on, be the target in view or not in between, it still
+    has not been found. A re-entry in the last 5 s of a sequence can't fail.
 
-def _waiting(truth: Boxes, found: Boxes, start: int) -> int | None:
-    """Frames from `start` until the target is found, 0 if it is at once; None if it never is."""
-    for index in range(start, len(truth)):
-        if frame_overlap(truth[index], found[index]) > FOUND_OVERLAP:
-            return index - start
-    return None
+    Parameters
+    ----------
+    in_view : whether the target is in view, one a frame.
+    overlaps : overlap of true and found box, 0 where there is none of either.
+
+    Returns
+    -------
+    dict with reentries, reentries_found and failures.
+    """
+    starts = [i for i in range(1, len(in_view)) if in_view[i] and not in_view[i - 1]]
+    hits = [i for i, overlap in enumerate(overlaps) if overlap > FOUND_OVERLAP]
+    waits = [next((hit for hit in hits if hit >= start), None) for start in starts]
+    unseen = [
+        (len(in_view) if hit is None else hit) - start for start, hit in zip(starts, waits, strict=True)
+    ]
+    found = [hit is not None and n < FOUND_FRAMES for n, hit in zip(unseen, waits, strict=True)]
+    return {
+        "reentries": len(starts),
+        "reentries_found": sum(found),
+        "failures": sum(n > FAILURE_FRAMES for n in unseen),
+    }
 
 
 def score(truth: Boxes, found: Boxes) -> dict:
@@ -98,19 +115,17 @@ def score(truth: Boxes, found: Boxes) -> dict:
 
     Returns
     -------
-    dict with frames, absent (frames), overlap (counts at each of `OVERLAPS`), boxes_while_absent, reentries,
-    reentries_found (within 25 frames) and failures (not found within 150 frames of a re-entry).
+    dict with frames, absent (frames), overlap (counts at each of `OVERLAPS`), boxes_while_absent, and
+    what `recoveries` returns.
     """
-    starts = reentries(truth)
-    waits = [_waiting(truth, found, start) for start in starts]
-    unseen = [len(truth) - start if wait is None else wait for start, wait in zip(starts, waits, strict=True)]
     absent = [box for true_box, box in zip(truth, found, strict=True) if true_box is None]
     return {
         "frames": len(truth),
         "absent": len(absent),
         "overlap": {str(value): count(truth, found, value).as_dict() for value in OVERLAPS},
         "boxes_while_absent": sum(box is not None for box in absent),
-        "reentries": len(starts),
-        "reentries_found": sum(wait is not None and wait < FOUND_FRAMES for wait in waits),
-        "failures": sum(frames > FAILURE_FRAMES for frames in unseen),
+        **recoveries(
+            [true_box is not None for true_box in truth],
+            [frame_overlap(true_box, box) for true_box, box in zip(truth, found, strict=True)],
+        ),
     }

@@ -8,7 +8,7 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import Image
 from std_srvs.srv import Empty
 
-from tld_follower.evaluation.graph import GraphError, wait_for_edges
+from tld_follower.evaluation.graph import GraphError, wait_for_edges, world_file
 from tld_follower.msg import BoundingBox, FollowState, Truth
 
 # How long one frame may take before the flight is given up; lockstep itself goes on after less.
@@ -21,6 +21,32 @@ _SOURCES = {
     "box": ("/NODE", "/pointA", BoundingBox),
     "state": ("/pointsdepthA", "/pointsdepthA/state", FollowState),
 }
+
+
+def simulation_arguments(scenario, seed, resolution, image_noise, world=None):
+    """Arguments of sim.launch for a `Stage`; `world` is a file, the scenario's own if None."""
+    return {
+        "mode": "lockstep",
+        "lockstep_target": "true",
+        "lockstep_timeout": "30",
+        "paused": "true",
+        "resolution": resolution,
+        "image_noise": image_noise,
+        "seed": seed,
+        "spiri_pose": _pose(scenario.spiri_pose(seed)),
+        "husky_pose": _pose(scenario.husky_pose(seed)),
+        "world": world.resolve() if world else world_file(scenario.world),
+    }
+
+
+def _pose(values):
+    return ",".join(f"{value:.6f}" for value in values)
+
+
+def _twist(forward, left, turn):
+    command = Twist()
+    command.linear.x, command.linear.y, command.angular.z = forward, left, turn
+    return command
 
 
 class Stage:
@@ -43,7 +69,7 @@ class Stage:
         self._sources = {kind: _SOURCES[kind] for kind in watched}
         self._frames = {}  # stamp -> {kind: message}
         self._changed = threading.Condition()
-        self._drivers = {"/husky/cmd_vel": scenario.target_command}
+        self._drivers = {"/husky/cmd_vel": self._target_command}
         if scenario.scripted:
             self._drivers["/cmd_vel"] = scenario.drone_command
         self._publishers = {
@@ -58,6 +84,10 @@ class Stage:
         """Take this stage's topics off the graph."""
         for topic in [*self._subscribers, *self._publishers.values()]:
             topic.unregister()
+
+    def _target_command(self, t, seed):
+        speed, turn = self._scenario.target_command(t, seed)
+        return speed, 0.0, turn
 
     def _store(self, message, kind):
         stamp = message.captured if kind == "box" else message.header.stamp
@@ -97,9 +127,7 @@ class Stage:
             if t >= self._scenario.end:
                 return
             for topic, command_at in self._drivers.items():
-                command = Twist()
-                command.linear.x, command.angular.z = command_at(t, self._seed)
-                self._publishers[topic].publish(command)
+                self._publishers[topic].publish(_twist(*command_at(t, self._seed)))
 
     def _next_frame(self, after, alive):
         """Wait for the next frame that is complete; return its stamp and messages."""

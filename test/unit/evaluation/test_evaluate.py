@@ -4,6 +4,7 @@
 import csv
 import json
 import os
+import shutil
 from pathlib import Path
 
 import cv2
@@ -11,8 +12,9 @@ import numpy as np
 import pytest
 
 from tld_follower.box import Box
-from tld_follower.evaluation import sequences
+from tld_follower.evaluation import sequences, shooting
 from tld_follower.evaluation.evaluate import main, parse_settings
+from tld_follower.evaluation.sequences import SequenceError
 from tld_follower.tld.parameters import Parameters
 
 KEYS = {
@@ -79,7 +81,7 @@ def test_scores_json_and_report(folder, tmp_path, capsys):
     note.write_text("not a sequence")
     scores, report = tmp_path / "scores.json", tmp_path / "report"
     arguments = [str(folder), str(note), "--tracker", "tld", "tld_sift"]
-    assert main([*arguments, "--json", str(scores), "--report", str(report)]) == 0
+    assert main([*arguments, "--json", str(scores), "--report", str(report), "--fastboard", "0"]) == 0
     output = capsys.readouterr()
     assert "made" in output.out
     assert "README.md" in output.err
@@ -92,12 +94,65 @@ def test_scores_json_and_report(folder, tmp_path, capsys):
         assert result["cpu_ms_mean"] > 0
         assert result["templates"] > 1
     names = {path.name for path in report.iterdir()}
-    assert names == {"scores.csv", "scores.md", "success.png", "made_tld.png", "made_tld_sift.png"}
+    tables = {f"{stem}.{kind}" for stem in ("scores", "table_4_1", "table_4_2") for kind in ("csv", "md")}
+    assert names == tables | {"report.html", "success.png", "made_tld.png", "made_tld_sift.png"}
     with (report / "scores.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["sequence"] for row in rows] == ["made", "made", "mean", "mean"]
     sheet = cv2.imread(str(report / "made_tld.png"))
     assert sheet.shape == (4 * 135, 6 * 240, 3)
+
+
+@pytest.fixture
+def filmed(monkeypatch, folder):
+    """Films of fastboard that are quickly made: copies of the sequence. Returns the calls."""
+    calls = []
+
+    def shoot(scenario, seeds, directory):
+        calls.append((scenario.name, list(seeds)))
+        copies = [directory / f"fastboard-{seed}" for seed in seeds]
+        return [shutil.copytree(folder, copy) for copy in copies]
+
+    monkeypatch.setattr(shooting, "shoot", shoot)
+    return calls
+
+
+def test_a_report_of_both_trackers_films_fastboard(folder, tmp_path, filmed, capsys):
+    scores, report = tmp_path / "scores.json", tmp_path / "report"
+    arguments = ["--json", str(scores), "--report", str(report), "--fastboard", "2"]
+    assert main([str(folder), "--tracker", "tld", *arguments]) == 0
+    assert filmed == []
+    assert main([str(folder), "--tracker", "tld", "tld_sift", *arguments]) == 0
+    assert filmed == [("fastboard", [0, 1])]
+    assert (report / "failures.png").is_file()
+    assert "fastboard-0_tld.png" in (report / "report.html").read_text()
+    # The films are the report's; what was asked for is scored alone.
+    assert {r["sequence"] for r in json.loads(scores.read_text())} == {"made"}
+    assert "fastboard" not in capsys.readouterr().out
+    with (report / "table_4_1.csv").open() as file:
+        (row,) = (row for row in csv.DictReader(file) if row["Sequence"] == "Fastboard")
+    assert (row["Frames"], row["Occlusions"]) == (str(FRAMES), "4")
+    assert float(row["TLD"]) > 0
+
+
+def test_given_films_of_fastboard_are_used(folder, tmp_path, filmed):
+    given = shutil.copytree(folder, tmp_path / "fastboard-7")
+    report = tmp_path / "report"
+    assert main([str(given), "--tracker", "tld", "tld_sift", "--report", str(report)]) == 0
+    assert filmed == []
+    assert (report / "failures.png").is_file()
+
+
+def test_without_a_simulator_the_report_says_so(folder, tmp_path, monkeypatch, capsys):
+    def shoot(*_):
+        raise SequenceError("fastboard cannot be filmed: no simulator")
+
+    monkeypatch.setattr(shooting, "shoot", shoot)
+    report = tmp_path / "report"
+    assert main([str(folder), "--tracker", "tld", "tld_sift", "--report", str(report)]) == 0
+    assert "no simulator" in capsys.readouterr().err
+    assert "no simulator" in (report / "report.html").read_text()
+    assert not (report / "failures.png").exists()
 
 
 def test_clips_go_by_their_own_names(folder, tmp_path):

@@ -61,3 +61,33 @@ def test_boxes_while_absent():
 def test_lengths_must_agree():
     with pytest.raises(ValueError, match="zip"):
         scoring.score([HERE], [HERE, HERE])
+
+
+def seen(pattern, length):
+    """Frames of a pattern like {start: value}, each value held until the next."""
+    values = [False] * length
+    for start, value in pattern.items():
+        values[start:] = [value] * (length - start)
+    return values
+
+
+@pytest.mark.parametrize(
+    ("found_from", "found", "failures"),
+    [(10, 1, 0), (34, 1, 0), (35, 0, 0), (160, 0, 0), (161, 0, 1), (400, 0, 1)],
+)
+def test_a_reentry_fails_after_five_seconds_without_the_target(found_from, found, failures):
+    in_view = seen({0: True, 5: False, 10: True}, 400)
+    overlaps = [0.6 * hit for hit in seen({0: True, 5: False, found_from: True}, 400)]
+    assert scoring.recoveries(in_view, overlaps) == {
+        "reentries": 1,
+        "reentries_found": found,
+        "failures": failures,
+    }
+
+
+def test_every_reentry_counts_and_the_last_five_seconds_cannot_fail():
+    in_view = seen({0: True, 5: False, 30: True, 60: False, 100: True, 140: False, 200: True}, 265)
+    never = [0.0] * 265
+    assert scoring.recoveries(in_view, never) == {"reentries": 3, "reentries_found": 0, "failures": 2}
+    late = [0.5 * hit for hit in seen({225: True}, 265)]
+    assert scoring.recoveries(in_view, late) == {"reentries": 3, "reentries_found": 0, "failures": 1}

@@ -1,0 +1,64 @@
+"""Shoots films of a scripted scenario with the simulator alone: no tracker, no follower."""
+
+import tempfile
+from contextlib import closing
+from pathlib import Path
+
+import rospy
+
+from tld_follower.evaluation import graph
+from tld_follower.evaluation.film import Film
+from tld_follower.evaluation.sequences import SequenceError
+from tld_follower.evaluation.stage import Stage, simulation_arguments
+
+
+def shoot(scenario, seeds, directory, resolution="320x240", image_noise=1.0):
+    """Shoot a film of each seed, the same one that `experiment --film` saves.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        One that flies the drone by a script.
+    seeds : iterable of int
+    directory : Path
+        Gets one sequence folder a film, SCENARIO-SEED.
+    resolution : str
+        WxH in pixels.
+    image_noise : float
+        Standard deviation in grey levels.
+
+    Returns
+    -------
+    list of Path
+        The sequence folders.
+
+    Raises
+    ------
+    SequenceError
+        If the simulator does not run or a film cannot be written.
+    """
+    try:
+        return _shoot(scenario, seeds, directory, resolution, image_noise)
+    except (graph.GraphError, rospy.ROSException, OSError) as error:
+        raise SequenceError(f"{scenario.name} cannot be filmed: {error}") from error
+
+
+def _shoot(scenario, seeds, directory, resolution, image_noise):
+    logs = Path(tempfile.mkdtemp(prefix="tld_follower-films-"))
+    folders = []
+    with graph.private_master(logs):
+        rospy.init_node("films", disable_signals=True)
+        for seed in seeds:
+            folders.append(directory / f"{scenario.name}-{seed}")
+            arguments = simulation_arguments(scenario, seed, resolution, image_noise)
+            with (
+                closing(Film(folders[-1])) as film,
+                closing(Stage(scenario, seed, ("truth", "image"))) as stage,
+                graph.launched("sim.launch", arguments, logs / f"{scenario.name}-{seed}.log") as alive,
+            ):
+                stage.wait_until_connected(alive=alive)
+                for t, frame in stage.frames(alive):
+                    if t >= scenario.box_at:
+                        film.add(frame, t)
+        rospy.signal_shutdown("done")
+    return folders
