@@ -113,15 +113,14 @@ def test_boxes_and_pictures_of_a_film_belong_together(films):
         if box is None or box.x < 1 or box.right > image.shape[1] - 1:
             continue
         hue, saturation, value = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2HSV))
-        # Husky's shell is the only thing that yellow; the camera pans by 8 pixels a frame and more.
-        shell = (abs(hue.astype(int) - 24) < 4) & (saturation > 180) & (value > 110)
-        rows, columns = np.nonzero(shell)
-        near = (columns > box.x - 30) & (columns < box.right + 30)
-        assert columns[near].min() >= box.x
-        assert columns[near].max() < box.right
-        assert rows[near].min() >= box.y
-        # The shell is nearly as wide as the target.
-        assert np.ptp(columns[near]) > 0.7 * box.width
+        # Husky's shell is the only thing near it that is so yellow. The camera pans by 8 pixels and more in most
+        # frames: the box of another frame would cut the shell.
+        shell = (abs(hue.astype(int) - 24) < 5) & (saturation > 180) & (value > 110)
+        top, bottom = max(0, int(box.y) - 10), int(box.bottom) + 10
+        columns = np.flatnonzero(shell[top:bottom].sum(axis=0) >= 3)
+        columns = columns[(columns > box.x - 30) & (columns < box.right + 30)]
+        assert box.x <= columns.min() <= box.x + 15
+        assert columns.max() < box.right
         checked += 1
     assert checked > 40
 
