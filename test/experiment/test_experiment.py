@@ -113,8 +113,8 @@ def test_boxes_and_pictures_of_a_film_belong_together(films):
         if box is None or box.x < 1 or box.right > image.shape[1] - 1:
             continue
         hue, saturation, value = cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2HSV))
-        # Husky's shell is the only thing near it that is so yellow. The camera pans by 8 pixels and more in most
-        # frames: the box of another frame would cut the shell.
+        # Husky's shell is the only thing near it that is so yellow. The camera pans by 8 pixels and more in
+        # most frames: the box of another frame would cut the shell.
         shell = (abs(hue.astype(int) - 24) < 5) & (saturation > 180) & (value > 110)
         top, bottom = max(0, int(box.y) - 10), int(box.bottom) + 10
         columns = np.flatnonzero(shell[top:bottom].sum(axis=0) >= 3)
