@@ -49,9 +49,14 @@ class TargetDepth:
         """Side of the target times its depth [pixel m]; None until it was seen often enough."""
         return self._size
 
-    @size.setter
-    def size(self, value: float | None) -> None:
-        self._size = value
+    @property
+    def relief(self) -> float | None:
+        """Depth of the target's front over its own; None until it was seen."""
+        return self._relief
+
+    def restore(self, size: float | None, relief: float | None) -> None:
+        """Take over the `size` and `relief` that were learnt elsewhere."""
+        self._size, self._relief = size, relief
 
     @property
     def distance(self) -> float | None:
@@ -170,7 +175,9 @@ class TargetDepth:
     @property
     def _nearest(self) -> float:
         """What is nearer than this is not the target but stands before it [m]."""
-        return 0.0 if self._relief is None else self._nearer(self._relief * self._distance - self._moved)
+        if self._relief is None or self._distance is None:
+            return 0.0
+        return self._nearer(self._relief * self._distance - self._moved)
 
     def _nearer(self, depth: float) -> float:
         """Return what stereo may measure at least where the depth is so much [m]."""

@@ -51,7 +51,8 @@ class Model:
     phase : share of the windows that the detector scanned last.
     random : state of the generator of the learner, as numpy's PCG64 gives it.
     sift_calls : frames that the SIFT memory was shown.
-    depth_size : side of the target times its depth [pixel m], None where unknown.
+    depth_size, depth_relief : side of the target times its depth [pixel m], and its front's depth over that
+        depth; None where unknown.
     comparisons : (ferns, comparisons, 4) float64, fractions 0..1 of the window.
     counts : (2, ferns, 2^comparisons) int32, positive and negative examples.
     positives, negatives : (N, 225) float32 templates in the order of time.
@@ -69,6 +70,7 @@ class Model:
     random: dict[str, Any]
     sift_calls: int
     depth_size: float | None
+    depth_relief: float | None
     comparisons: np.ndarray
     counts: np.ndarray
     positives: np.ndarray
@@ -236,7 +238,6 @@ def _checked(header: dict[str, Any], arrays: dict[str, np.ndarray], parameters: 
         f"its target of {target.width:g}x{target.height:g} pixels is smaller than min_side",
     )
     np.random.PCG64().state = header["random"]
-    unknown_size = header["depth_size"] is None
     return Model(
         image=(width, height),
         target=target,
@@ -247,6 +248,7 @@ def _checked(header: dict[str, Any], arrays: dict[str, np.ndarray], parameters: 
         phase=number("phase", 0, MAX_COUNT, int),
         random=header["random"],
         sift_calls=number("sift_calls", 0, MAX_COUNT, int),
-        depth_size=None if unknown_size else number("depth_size", 1e-3, 1e9),
+        depth_size=None if header["depth_size"] is None else number("depth_size", 1e-3, 1e9),
+        depth_relief=None if header["depth_relief"] is None else number("depth_relief", 1e-3, 1e3),
         **arrays,
     )

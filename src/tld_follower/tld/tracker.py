@@ -158,6 +158,7 @@ class Tracker:
             random=self._rng.bit_generator.state,
             sift_calls=calls,
             depth_size=self._depth.size,
+            depth_relief=self._depth.relief,
             comparisons=detector.ferns.comparisons.copy(),
             counts=detector.ferns.counts,
             positives=detector.model.positives.patches.copy(),
@@ -175,7 +176,7 @@ class Tracker:
         model : of a tracker with the same `storage.DECISIVE` parameters.
         """
         depth = TargetDepth(self._parameters)
-        depth.size = model.depth_size
+        depth.restore(model.depth_size, model.depth_relief)
         width, height = model.image
         blank = Frame(np.zeros((height, width), np.uint8), self._parameters.blur)
         self._begin(blank, model.target, depth)

@@ -79,7 +79,7 @@ def test_what_was_read_is_what_was_written(saved):
             assert getattr(again, name).dtype == value.dtype
 
 
-def test_the_size_that_depth_has_learnt_is_kept(tmp_path):
+def test_what_depth_has_told_is_kept(tmp_path):
     tracker, depth = Tracker(), np.full((240, 320), 2.0, np.float32)
     tracker.init(SCENE.frame(FIRST), FIRST, depth)
     for _ in range(15):
@@ -87,6 +87,17 @@ def test_the_size_that_depth_has_learnt_is_kept(tmp_path):
     storage.save(tmp_path / "m.npz", tracker.model(), Parameters())
     model = storage.load(tmp_path / "m.npz", Parameters())
     assert model.depth_size == pytest.approx(2.0 * np.sqrt(FIRST.area), rel=0.05)
+    assert model.depth_relief == pytest.approx(1.0)
+    restored = Tracker()
+    restored.restore(model)
+    assert restored.model().depth_size == model.depth_size
+    assert restored.model().depth_relief == model.depth_relief
+    found = [restored.update(SCENE.frame(FIRST), depth) for _ in range(3)][-1]
+    assert found.box.overlap(FIRST) > 0.8
+    # What looks like the target but is half as large, so near, is another thing.
+    other = Tracker()
+    other.restore(model)
+    assert not any(other.update(SCENE.frame(FIRST), 0.5 * depth).visible for _ in range(3))
 
 
 def test_a_model_needs_a_target():
@@ -180,6 +191,7 @@ NAN = float("nan")
         ({"phase": 0.5}, "phase"),
         ({"sift_calls": -1}, "sift_calls"),
         ({"depth_size": float("inf")}, "depth_size"),
+        ({"depth_relief": 0}, "depth_relief"),
         ({"random": {"bit_generator": "MT19937"}}, "damaged|PCG64"),
         ({"random": 5}, "damaged"),
         ({"parameters": []}, "damaged"),
