@@ -60,7 +60,7 @@ class TargetDepth:
 
     @property
     def distance(self) -> float | None:
-        """Depth of the target where it was last seen unoccluded [m]; None before."""
+        """Depth of the target when it was last measured [m]; None before."""
         return self._distance
 
     def look(self, depth: np.ndarray | None, height: int, width: int) -> None:
@@ -96,12 +96,12 @@ class TargetDepth:
         if depths is None:
             return True
         low, high = self._limits(box)
-        return np.mean((depths >= low) & (depths <= high)) >= self._parameters.depth_support
+        return bool(np.mean((depths >= low) & (depths <= high)) >= self._parameters.depth_support)
 
     def occluded(self, box: Box) -> bool:
         """Whether something stands before the target: many pixels of the box are nearer than its front."""
         depths = self._sample(box)
-        return depths is not None and np.mean(depths < self._nearest) > self._parameters.depth_front
+        return depths is not None and bool(np.mean(depths < self._nearest) > self._parameters.depth_front)
 
     def uncovered(self, points: np.ndarray) -> np.ndarray:
         """Return the points (N, 2) [pixel] that nothing stood before in the frame before this one."""
