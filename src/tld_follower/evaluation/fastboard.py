@@ -1,6 +1,7 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Scenario `fastboard`: the target is gone five frames after it was shown, and comes and goes from then on.
 
-After the thesis' own sequence of that name (table 4.1: 265 frames, the target in view in 140), which is not
+After the thesis' own sequence of that name (265 frames, the target in view in 140), which is not
 published. Drone and target move on a script, so that every tracker is shown the same film.
 """
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Films a flight: left images and the target's true boxes, as a sequence that `evaluate` reads."""
 
 import cv2

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """Shoots films of a scripted scenario with the simulator alone: no tracker, no follower."""
 
 import tempfile

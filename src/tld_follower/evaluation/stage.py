@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: BSD-3-Clause
 """The simulation in lockstep from outside: answers every frame with the commands of a scenario's script."""
 
 import threading
