@@ -21,20 +21,22 @@ def to_gray(image: np.ndarray) -> NDArray[np.uint8]:
 
     Parameters
     ----------
-    image : uint8 array, (H, W) grey or (H, W, 3) BGR, any strides.
+    image : uint8 or uint16 array, (H, W) grey or (H, W, 3) BGR, any strides; of 16 bits the upper 8 count.
 
     Raises
     ------
     ValueError
         If the image is empty or of another type or shape.
     """
-    if not isinstance(image, np.ndarray) or image.dtype != np.uint8:
+    if not isinstance(image, np.ndarray) or image.dtype not in (np.uint8, np.uint16):
         kind = image.dtype if isinstance(image, np.ndarray) else type(image).__name__
-        raise ValueError(f"the image must be an array of uint8, got {kind}")
+        raise ValueError(f"the image must be an array of uint8 or uint16, got {kind}")
     if image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
         raise ValueError(f"the image must be HxW grey or HxWx3 BGR, got shape {image.shape}")
     if image.size == 0:
         raise ValueError(f"the image is empty, shape {image.shape}")
+    if image.dtype == np.uint16:
+        image = (image >> 8).astype(np.uint8)
     if image.ndim == 2:
         return np.array(image, order="C")
     return cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_BGR2GRAY)
@@ -63,7 +65,7 @@ class Frame:
 
     Parameters
     ----------
-    image : uint8 (H, W) or (H, W, 3) BGR; see `to_gray`.
+    image : uint8 or uint16, (H, W) or (H, W, 3) BGR; see `to_gray`.
     blur : standard deviation of the blurred copies [pixel of the level].
     """
 

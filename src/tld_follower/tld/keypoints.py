@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The points that carry the median flow: a regular grid, or the target's SIFT keypoints completed by it."""
+"""The points that carry the median flow: a regular grid, or the target's SIFT keypoints with it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from tld_follower.tld.frame import Frame
 
 GRID_MARGIN = 0.05
 DESCRIPTOR = 128
+# Side of the region about a target that is searched for its keypoints, its own being 1.
+REACH = 1.6
 
 
 def grid(box: Box, side: int) -> np.ndarray:
@@ -31,21 +33,29 @@ class SiftKeypoints:
     Parameters
     ----------
     limit : at most this many keypoints a call, the strongest first.
-    max_side : a region is read from the first octave where its longer side is not larger [pixel].
+    side : a target is read from the first octave where its side (root of the area) is not larger [pixel].
     """
 
-    def __init__(self, limit: int, max_side: float) -> None:
+    def __init__(self, limit: int, side: float) -> None:
         self._sift = cv2.SIFT_create(nfeatures=limit)
-        self._max_side = max_side
+        self._side = side
 
-    def detect(self, frame: Frame, region: Box) -> tuple[np.ndarray, np.ndarray]:
+    def octave(self, target: Box) -> int:
+        """Return the octave that a target of this size is read from."""
+        return max(0, int(np.ceil(np.log2(max(np.sqrt(target.area), 1.0) / self._side))))
+
+    def detect(self, frame: Frame, region: Box, octave: int) -> tuple[np.ndarray, np.ndarray]:
         """Find the keypoints of a region.
+
+        Parameters
+        ----------
+        region : part of the frame [pixel].
+        octave : the level to read, see `octave`.
 
         Returns
         -------
         points (N, 2) float32 [pixel] and descriptors (N, 128) float32.
         """
-        octave = max(0, int(np.ceil(np.log2(max(region.width, region.height, 1.0) / self._max_side))))
         gray = frame.level(octave).gray
         factor = round(frame.height / gray.shape[0])
         part = Box(*(v / factor for v in region.as_tuple())).clip(gray.shape[1], gray.shape[0])
@@ -59,18 +69,24 @@ class SiftKeypoints:
         points = cv2.KeyPoint_convert(found) + np.array([x0 + 0.5, y0 + 0.5], np.float32)
         return (points * factor).astype(np.float32), descriptors
 
-    def flow_points(self, frame: Frame, box: Box, grid_side: int) -> np.ndarray:
-        """Return the keypoints inside a box, completed by grid points up to grid_side^2 (N, 2) float32."""
-        points, _ = self.detect(frame, box.scale(1.2))
-        inside = (
-            (points[:, 0] > box.x)
-            & (points[:, 0] < box.right)
-            & (points[:, 1] > box.y)
-            & (points[:, 1] < box.bottom)
-        )
-        points = points[inside][: grid_side * grid_side]
-        missing = grid_side * grid_side - len(points)
-        if missing <= 0:
-            return points
-        side = int(np.ceil(np.sqrt(missing)))
-        return np.concatenate([points, grid(box, side)])
+    def around(self, frame: Frame, target: Box) -> tuple[np.ndarray, np.ndarray]:
+        """Find the keypoints of a target and of its near surroundings; see `detect`."""
+        return self.detect(frame, target.scale(REACH), self.octave(target))
+
+
+def flow_points(points: np.ndarray, box: Box, grid_side: int) -> np.ndarray:
+    """Return the keypoints inside a box, at most half of grid_side^2, and the grid: (N, 2) float32.
+
+    Blur takes the keypoints first: the grid must be able to carry the flow alone.
+
+    Parameters
+    ----------
+    points : keypoints (N, 2) float32 [pixel].
+    """
+    inside = (
+        (points[:, 0] > box.x)
+        & (points[:, 0] < box.right)
+        & (points[:, 1] > box.y)
+        & (points[:, 1] < box.bottom)
+    )
+    return np.concatenate([points[inside][: grid_side * grid_side // 2], grid(box, grid_side)])

@@ -17,6 +17,12 @@ LK_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.03)
 # Dark targets have small gradients; the forward-backward error judges the points, not their contrast.
 LK_MIN_EIGENVALUE = 1e-6
 MIN_POINTS = 4
+# The background's motion is known from at least so many points that came back to within a pixel.
+MIN_BACKGROUND = 8
+MAX_BACKGROUND_ERROR = 1.0
+# Motion apart from it differs by this share of the target's side, for between these shares of the points.
+MIN_APART = 0.02
+MIN_SHARE, MAX_SHARE = 0.15, 0.9
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,31 @@ class Flow:
     residual: float
 
 
+@dataclass(frozen=True)
+class Points:
+    """Points followed forward and back, (N, 2) float32 each [pixel of the crops]."""
+
+    start: np.ndarray
+    end: np.ndarray
+    back: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def __getitem__(self, chosen: np.ndarray) -> Points:
+        return Points(self.start[chosen], self.end[chosen], self.back[chosen])
+
+    @property
+    def error(self) -> np.ndarray:
+        """Forward-backward error of each (eq. 3.2) [pixel]."""
+        return np.hypot(*(self.start - self.back).T)
+
+    @property
+    def motion(self) -> np.ndarray:
+        """Displacement of each [pixel]."""
+        return self.end - self.start
+
+
 def track(
     previous: Frame,
     current: Frame,
@@ -42,12 +73,15 @@ def track(
     points: np.ndarray,
     parameters: Parameters,
     guess: tuple[float, float] = (0.0, 0.0),
-) -> Flow | None:
+) -> list[Flow]:
     """Move a box from one frame to the next.
 
     Points go forward and back by pyramidal Lucas-Kanade; those with a forward-backward error (eq. 3.2) above
     the median or an NCC (eq. 3.3) under the median are dropped. The box moves by the median displacement and
     scales by the median ratio of the distances between pairs of points.
+
+    A box also holds some of what is behind the target. Where a part of its points moves otherwise than the
+    surroundings of the box, the motion of these alone is a second answer.
 
     Parameters
     ----------
@@ -57,7 +91,8 @@ def track(
 
     Returns
     -------
-    The flow, or None if too few points were found or their median error exceeds `max_fb_error`.
+    The motion of all points, then that of those which leave the background behind; each is missing where too
+    few points were found or their median error exceeds `max_fb_error`.
     """
     if len(points) < MIN_POINTS:
         return None
@@ -65,8 +100,36 @@ def track(
     # A large target is tracked on a smaller octave: the same points, a wider reach, bounded cost.
     octave = max(0, int(np.floor(np.log2(side / parameters.flow_side))))
     before, after, factor, origin = _crops(previous, current, box, octave, parameters, guess)
-    start = (np.ascontiguousarray(points, np.float32) / factor - origin - 0.5).reshape(-1, 1, 2)
-    shift = np.array(guess, np.float32) / factor
+    both = np.concatenate([np.asarray(points, np.float32), surroundings(box)])
+    start = both / factor - origin - np.float32(0.5)
+    inner = np.arange(len(start)) < len(points)
+    found, good = _follow(before, after, start, np.array(guess, np.float32) / factor, parameters)
+    own, around = found[good & inner], found[good & ~inner]
+
+    def solve(chosen: Points) -> Flow | None:
+        return _motion(before, after, chosen, box, factor, parameters)
+
+    apart = _apart(own, around[around.error < MAX_BACKGROUND_ERROR], MIN_APART * side / factor)
+    answers = [solve(own), solve(own[apart]) if apart.any() else None]
+    return [flow for flow in answers if flow is not None]
+
+
+def surroundings(box: Box) -> np.ndarray:
+    """Return points on a grid over twice the sides of a box, those on it and near it left out (N, 2) float32.
+
+    [pixel]
+    """
+    steps = np.linspace(-0.4, 1.4, 9)
+    x, y = (axis.ravel() for axis in np.meshgrid(steps, steps))
+    outside = np.maximum(np.abs(x - 0.5), np.abs(y - 0.5)) > 0.6
+    places = np.stack([box.x + x * box.width, box.y + y * box.height], axis=1)
+    return places[outside].astype(np.float32)
+
+
+def _follow(
+    before: np.ndarray, after: np.ndarray, start: np.ndarray, shift: np.ndarray, parameters: Parameters
+) -> tuple[Points, np.ndarray]:
+    """Follow points (N, 2) forward and back; returns them all and which were found, (N,) bool."""
     options = {
         "winSize": (parameters.lk_window, parameters.lk_window),
         "maxLevel": parameters.lk_levels,
@@ -74,29 +137,56 @@ def track(
         "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
         "minEigThreshold": LK_MIN_EIGENVALUE,
     }
-    end, found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, start + shift, **options)
+    first = start.reshape(-1, 1, 2)
+    end, found, _ = cv2.calcOpticalFlowPyrLK(before, after, first, first + shift, **options)
     back, returned, _ = cv2.calcOpticalFlowPyrLK(after, before, end, end - shift, **options)
-    start, end, back = start[:, 0], end[:, 0], back[:, 0]
-    height, width = after.shape
-    good = np.isfinite(end).all(axis=1) & np.isfinite(back).all(axis=1)
-    good &= (found[:, 0] & returned[:, 0]).astype(bool)
-    good &= (end[:, 0] >= 0) & (end[:, 1] >= 0) & (end[:, 0] <= width - 1) & (end[:, 1] <= height - 1)
-    if np.count_nonzero(good) < MIN_POINTS:
+    points = Points(start, end[:, 0], back[:, 0])
+    good = (found[:, 0] & returned[:, 0]).astype(bool)
+    good &= np.isfinite(points.end).all(axis=1) & np.isfinite(points.back).all(axis=1)
+    size = np.array(before.shape[::-1], np.float32)
+    for places in (points.start, points.end):
+        good &= ((places >= 0.0) & (places <= size - 1.0)).all(axis=1)
+    return points, good
+
+
+def _apart(own: Points, around: Points, least: float) -> np.ndarray:
+    """Find the points (N,) bool that move otherwise than the surroundings, none if too few or nearly all.
+
+    Parameters
+    ----------
+    least : the difference that counts [pixel of the crops].
+    """
+    none = np.zeros(len(own), bool)
+    if len(around) < MIN_BACKGROUND:
+        return none
+    background = np.median(around.motion, axis=0)
+    wobble = np.median(np.hypot(*(around.motion - background).T))
+    differs = np.hypot(*(own.motion - background).T) > max(3.0 * wobble, least, 0.5)
+    share = differs.mean() if len(own) else 0.0
+    return differs if MIN_SHARE < share < MAX_SHARE else none
+
+
+def _motion(
+    before: np.ndarray, after: np.ndarray, points: Points, box: Box, factor: int, parameters: Parameters
+) -> Flow | None:
+    """Median motion of the better half of the points; `factor` is the crops' pixel size [pixel]."""
+    if len(points) < MIN_POINTS:
         return None
-    start, end, back = start[good], end[good], back[good]
-    distance = np.hypot(*(start - back).T)
+    side = np.sqrt(box.area)
+    distance = points.error
     error = float(np.median(distance)) * factor / side
     if error > parameters.max_fb_error:
         return None
-    similarity = patch_ncc(before, after, start, end, parameters.flow_patch)
+    similarity = patch_ncc(before, after, points.start, points.end, parameters.flow_patch)
     kept = distance <= np.median(distance)
     similar = kept & (similarity >= np.median(similarity))
     if np.count_nonzero(similar) >= MIN_POINTS:
         kept = similar
-    shift = np.median(end[kept] - start[kept], axis=0)
-    scale = median_scale(start[kept], end[kept])
-    expected = start + shift + (scale - 1.0) * (start - np.median(start[kept], axis=0))
-    residual = float(np.median(np.hypot(*(end - expected).T))) * factor / side
+    best = points[kept]
+    shift = np.median(best.motion, axis=0)
+    scale = median_scale(best.start, best.end)
+    expected = points.start + shift + (scale - 1.0) * (points.start - np.median(best.start, axis=0))
+    residual = float(np.median(np.hypot(*(points.end - expected).T))) * factor / side
     center_x, center_y = np.array(box.center) + shift * factor
     moved = Box.from_center(float(center_x), float(center_y), box.width * scale, box.height * scale)
     return Flow(moved, error, residual)

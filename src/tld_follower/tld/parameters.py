@@ -73,6 +73,7 @@ class Parameters:
     provisional_threshold: float = 0.58
     max_residual: float = 0.05
     confirm_frames: int = 3
+    persist_frames: int = 15
     patience_frames: int = 4
     grace_frames: int = 20
     widen_frames: int = 8
@@ -85,7 +86,8 @@ class Parameters:
     fusion_weight: float = 30.0
 
     sift_keypoints: int = 200
-    sift_side: float = 400.0
+    sift_side: float = 96.0
+    sift_pixels: int = 50000
     sift_views: int = 10
     sift_interval: int = 10
 

@@ -1,7 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SIFT re-detection: the target's keypoints propose a box after loss (the thesis' TLD_SIFT)."""
+"""The memory of the target's keypoints (the thesis' TLD_SIFT).
+
+They bear witness for or against a box, and propose one after loss.
+"""
 
 from __future__ import annotations
+
+import math
+from enum import IntEnum
 
 import cv2
 import numpy as np
@@ -14,6 +20,24 @@ RATIO = 0.75
 MIN_MATCHES = 5
 MAX_ERROR = 0.08
 
+# A witness's keypoints match less strictly, but lie within this share of the target's side of their places.
+WITNESS_RATIO = 0.8
+WITNESS_ERROR = 0.3
+# It speaks for a box with so many keypoints, and this share of those expected.
+MIN_WITNESSES, ENOUGH = 3, 0.5
+# Where so many are expected, it speaks against a box with only this share of them.
+MIN_EXPECTED, TOO_FEW = 4.0, 0.2
+# Of the first view's keypoints so many are expected again; later it is what trusted boxes showed.
+FIRST_SHARE, EXPECTATION_RATE = 0.4, 0.05
+
+
+class Witness(IntEnum):
+    """What the keypoints in a box say of it."""
+
+    AGAINST = -1
+    SILENT = 0
+    FOR = 1
+
 
 class SiftMemory:
     """A bounded memory of the target's keypoints, in coordinates of its box; the first view stays.
@@ -23,12 +47,15 @@ class SiftMemory:
     keypoints : the detector of keypoints.
     views : most views kept.
     interval : calls of `learn` for each view taken.
+    budget : about the most pixels searched in a frame; larger images are searched in tiles, one a frame.
     """
 
-    def __init__(self, keypoints: SiftKeypoints, views: int, interval: int) -> None:
+    def __init__(self, keypoints: SiftKeypoints, views: int, interval: int, budget: int) -> None:
         self._keypoints = keypoints
+        self._budget = budget
         self._interval = interval
         self._calls = 0
+        self._expected = 0.0
         self._views: list[tuple[np.ndarray, np.ndarray]] = []
         self._capacity = views
 
@@ -37,56 +64,120 @@ class SiftMemory:
         self._calls += 1
         if (self._calls - 1) % self._interval:
             return
-        points, descriptors = self._keypoints.detect(frame, box)
+        points, descriptors = self._keypoints.detect(frame, box, self._keypoints.octave(box))
         if len(points) == 0:
             return
+        if not self._views:
+            self._expected = FIRST_SHARE * len(points)
         relative = (points - np.array(box.center, np.float32)) / np.float32(np.sqrt(box.area))
         self._views.append((relative.astype(np.float32), descriptors))
         if len(self._views) > self._capacity:
             del self._views[1]
 
     @property
-    def state(self) -> tuple[int, list[tuple[np.ndarray, np.ndarray]]]:
-        """Calls of `learn`, and of each view the keypoints (N, 2) and descriptors (N, 128), float32."""
-        return self._calls, list(self._views)
+    def state(self) -> tuple[int, float, list[tuple[np.ndarray, np.ndarray]]]:
+        """Calls of `learn`, keypoints expected, and each view's points (N, 2) and descriptors (N, 128)."""
+        return self._calls, self._expected, list(self._views)
 
-    def restore(self, calls: int, views: list[tuple[np.ndarray, np.ndarray]]) -> None:
+    def restore(self, calls: int, expected: float, views: list[tuple[np.ndarray, np.ndarray]]) -> None:
         """Take over the `state` of another memory."""
-        self._calls, self._views = calls, list(views)
+        self._calls, self._expected, self._views = calls, expected, list(views)
 
-    def propose(self, frame: Frame, shape: Box) -> Box | None:
-        """Search the whole frame for the target.
+    def ask(self, points: np.ndarray, descriptors: np.ndarray, box: Box, trusted: bool) -> Witness:
+        """Judge a box by the keypoints about it.
+
+        Parameters
+        ----------
+        points, descriptors : (N, 2) and (N, 128) float32, see `SiftKeypoints.around`.
+        trusted : the box is the target for certain: it says how many keypoints are to be expected.
+        """
+        count, expected = self._recognised(points, descriptors, box), self._expected
+        if trusted:
+            self._expected += EXPECTATION_RATE * (count - expected)
+        if count >= max(MIN_WITNESSES, ENOUGH * expected):
+            return Witness.FOR
+        return Witness.AGAINST if expected >= MIN_EXPECTED and count <= TOO_FEW * expected else Witness.SILENT
+
+    def _recognised(self, points: np.ndarray, descriptors: np.ndarray, box: Box) -> int:
+        """Count the keypoints that are known and lie where the target in this box has them."""
+        if not self._views or len(points) < 2:
+            return 0
+        known, pairs = self._matches(descriptors, WITNESS_RATIO)
+        side = np.sqrt(box.area)
+        places = known[pairs[:, 0]] * side + np.array(box.center)
+        near = np.hypot(*(points[pairs[:, 1]] - places).T) < WITNESS_ERROR * side
+        return len(set(pairs[near, 1].tolist()))
+
+    def _matches(self, descriptors: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
+        """Match the memory with the keypoints of an image by Lowe's ratio test.
+
+        Each known keypoint looks for its place in the image: the second best there is a real rival.
+
+        Returns
+        -------
+        the known places (M, 2) in coordinates of the box, and pairs of indices (K, 2): known, in the image.
+        """
+        known = np.concatenate([view[0] for view in self._views])
+        memory = np.concatenate([view[1] for view in self._views])
+        matches = cv2.BFMatcher(cv2.NORM_L2).knnMatch(memory, descriptors, k=2)
+        pairs = [(a.queryIdx, a.trainIdx) for a, b in matches if a.distance < ratio * b.distance]
+        return known, np.array(pairs, np.int64).reshape(-1, 2)
+
+    def propose(self, frame: Frame, last: Box, turn: int) -> Box | None:
+        """Search the whole frame for the target, or its next tile where it is too large for one frame's time.
 
         Matches that pass Lowe's ratio test vote for a similarity transform, found robustly (RANSAC).
 
         Parameters
         ----------
-        shape : a box with the target's aspect ratio.
+        last : the target's last box; the search begins about it, and a proposal has its aspect ratio.
+        turn : counts the calls since the target was lost.
         """
         if not self._views:
             return None
-        points, descriptors = self._keypoints.detect(frame, Box(0.0, 0.0, frame.width, frame.height))
-        known = np.concatenate([view[0] for view in self._views])
-        memory = np.concatenate([view[1] for view in self._views])
+        octave = self._keypoints.octave(last)
+        tiles = search_tiles(frame.width, frame.height, last, self._budget * 4**octave)
+        points, descriptors = self._keypoints.detect(frame, tiles[turn % len(tiles)], octave)
         if len(points) < 2:
             return None
-        # Each known keypoint looks for its place in the image: the second best there is a real rival.
-        matches = cv2.BFMatcher(cv2.NORM_L2).knnMatch(memory, descriptors, k=2)
-        pairs = [(a.queryIdx, a.trainIdx) for a, b in matches if a.distance < RATIO * b.distance]
-        if len({train for _, train in pairs}) < MIN_MATCHES:
+        known, pairs = self._matches(descriptors, RATIO)
+        if len(np.unique(pairs[:, 1])) < MIN_MATCHES:
             return None
-        source = known[[query for query, _ in pairs]]
-        target = points[[train for _, train in pairs]]
-        side = np.sqrt(shape.area)
+        source, target = known[pairs[:, 0]], points[pairs[:, 1]]
+        side = np.sqrt(last.area)
         matrix, inliers = cv2.estimateAffinePartial2D(
             source * side, target, method=cv2.RANSAC, ransacReprojThreshold=MAX_ERROR * side + 1.0
         )
         if matrix is None:
             return None
-        distinct = {pairs[i][1] for i in np.flatnonzero(inliers)}
+        distinct = np.unique(pairs[inliers[:, 0] > 0, 1])
         scale = float(np.hypot(matrix[0, 0], matrix[1, 0]))
         if len(distinct) < MIN_MATCHES or not 0.2 < scale < 5.0:
             return None
         center = float(matrix[0, 2]), float(matrix[1, 2])
-        box = Box.from_center(*center, shape.width * scale, shape.height * scale)
+        box = Box.from_center(*center, last.width * scale, last.height * scale)
         return box if box.inside_fraction(frame.width, frame.height) > 0.5 else None
+
+
+def search_tiles(width: int, height: int, target: Box, budget: float) -> list[Box]:
+    """Cover an image with equal tiles that overlap by the target's sides, nearest to the target first.
+
+    Parameters
+    ----------
+    width, height : of the image [pixel].
+    budget : area of a tile [pixel]; it is exceeded only where a tile would not hold the target twice over.
+    """
+    if width * height <= budget:
+        return [Box(0.0, 0.0, width, height)]
+    side = np.sqrt(budget)
+    tile_width = min(width, max(side, 2.0 * target.width))
+    tile_height = min(height, max(budget / tile_width, 2.0 * target.height))
+    xs = _starts(width, tile_width, target.width)
+    ys = _starts(height, tile_height, target.height)
+    tiles = [Box(x, y, tile_width, tile_height) for y in ys for x in xs]
+    return sorted(tiles, key=lambda tile: math.dist(tile.center, target.center))
+
+
+def _starts(length: float, tile: float, overlap: float) -> list[float]:
+    count = 1 + math.ceil((length - tile) / (tile - overlap)) if length > tile else 1
+    return np.linspace(0.0, length - tile, count).tolist()

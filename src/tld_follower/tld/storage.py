@@ -51,6 +51,7 @@ class Model:
     phase : share of the windows that the detector scanned last.
     random : state of the generator of the learner, as numpy's PCG64 gives it.
     sift_calls : frames that the SIFT memory was shown.
+    sift_expected : keypoints that it expects to recognise on the target.
     depth_size, depth_relief : side of the target times its depth [pixel m], and its front's depth over that
         depth; None where unknown.
     comparisons : (ferns, comparisons, 4) float64, fractions 0..1 of the window.
@@ -69,6 +70,7 @@ class Model:
     phase: int
     random: dict[str, Any]
     sift_calls: int
+    sift_expected: float
     depth_size: float | None
     depth_relief: float | None
     comparisons: np.ndarray
@@ -248,6 +250,7 @@ def _checked(header: dict[str, Any], arrays: dict[str, np.ndarray], parameters: 
         phase=number("phase", 0, MAX_COUNT, int),
         random=header["random"],
         sift_calls=number("sift_calls", 0, MAX_COUNT, int),
+        sift_expected=number("sift_expected", 0.0, MAX_COUNT),
         depth_size=None if header["depth_size"] is None else number("depth_size", 1e-3, 1e9),
         depth_relief=None if header["depth_relief"] is None else number("depth_relief", 1e-3, 1e3),
         **arrays,

@@ -17,7 +17,7 @@ from tld_follower.tld.frame import Frame
 from tld_follower.tld.learning import Learner
 from tld_follower.tld.median_flow import Flow
 from tld_follower.tld.parameters import Parameters
-from tld_follower.tld.redetection import SiftMemory
+from tld_follower.tld.redetection import SiftMemory, Witness
 from tld_follower.tld.storage import Model
 from tld_follower.tld.trust import Trust
 
@@ -45,6 +45,10 @@ class Result:
 LEARNING_INSIDE = 0.9
 # A target that moves by less than this share of its side in a frame needs no second guess.
 FAST = 0.1
+# Clusters of detections whose keypoints are asked for in a frame, which takes a millisecond or two each.
+MAX_ASKED = 3
+# A second motion must lead to a view that is more alike by this.
+FIRST_MARGIN = 0.035
 LOST = Result(None, 0.0, False, False, "none")
 
 
@@ -88,7 +92,7 @@ class Tracker:
 
         Parameters
         ----------
-        image : uint8 (H, W) or (H, W, 3) BGR
+        image : uint8 or uint16, (H, W) or (H, W, 3) BGR; see `frame.to_gray`.
         box : the target [pixel]; a part outside the image is cut off.
         depth : float (H, W), the depth of each pixel [m], NaN where unknown; see `TargetDepth.look`.
 
@@ -126,11 +130,15 @@ class Tracker:
         self._memory: SiftMemory | None = None
         if parameters.tracker == "tld_sift":
             self._sift = keypoints.SiftKeypoints(parameters.sift_keypoints, parameters.sift_side)
-            self._memory = SiftMemory(self._sift, parameters.sift_views, parameters.sift_interval)
+            self._memory = SiftMemory(
+                self._sift, parameters.sift_views, parameters.sift_interval, parameters.sift_pixels
+            )
         self._frame = frame
         self._box: Box | None = box
         self._first_box = self._last_box = box
         self._velocity = (0.0, 0.0)
+        # Of the frame seen last, about the box: (N, 2) and (N, 128).
+        self._keypoints: tuple[np.ndarray, np.ndarray] | None = None
         self._trust = Trust(parameters)
 
     def model(self) -> Model:
@@ -143,7 +151,7 @@ class Tracker:
         """
         if self._frame is None:
             raise RuntimeError("the tracker has no target: call init first")
-        calls, views = self._memory.state if self._memory else (0, [])
+        calls, expected, views = self._memory.state if self._memory else (0, 0.0, [])
         points = [np.zeros((0, 2), np.float32), *(points for points, _ in views)]
         descriptors = [np.zeros((0, keypoints.DESCRIPTOR), np.float32), *(found for _, found in views)]
         detector = self._detector
@@ -157,6 +165,7 @@ class Tracker:
             phase=detector.phase,
             random=self._rng.bit_generator.state,
             sift_calls=calls,
+            sift_expected=expected,
             depth_size=self._depth.size,
             depth_relief=self._depth.relief,
             comparisons=detector.ferns.comparisons.copy(),
@@ -185,7 +194,7 @@ class Tracker:
         if self._memory:
             ends = np.cumsum(model.view_lengths)
             parts = (np.split(array, ends)[:-1] for array in (model.view_points, model.view_descriptors))
-            self._memory.restore(model.sift_calls, list(zip(*parts, strict=True)))
+            self._memory.restore(model.sift_calls, model.sift_expected, list(zip(*parts, strict=True)))
         self._last_box = model.last
         self._drop()
         self._trust.missed = self._parameters.scales * self._parameters.widen_frames
@@ -214,6 +223,7 @@ class Tracker:
             )
         self._depth.look(depth, frame.height, frame.width)
         flow = self._track(frame)
+        self._keypoints = None
         reach = min(
             self._parameters.tracking_scales + self._trust.missed // self._parameters.widen_frames,
             self._parameters.scales,
@@ -241,6 +251,7 @@ class Tracker:
         shift : by which the target lies further right there [pixel].
         """
         self._frame = Frame(image, self._parameters.blur)
+        self._keypoints = None
         self._depth.leave_view()
         moved = replace(self.box, x=self.box.x + shift)
         self._box = moved if self.tracking else None
@@ -252,21 +263,33 @@ class Tracker:
         if box is None:
             return None
         side = self._parameters.grid_points
-        if self._parameters.tracker == "tld_sift":
-            points = self._sift.flow_points(previous, box, side)
+        if self._memory:
+            if self._keypoints is None:
+                self._keypoints = self._sift.around(previous, box)
+            points = keypoints.flow_points(self._keypoints[0], box, side)
         else:
             points = keypoints.grid(box, side)
         points = self._depth.uncovered(points)
-        flow = median_flow.track(previous, frame, box, points, self._parameters)
+        flows = median_flow.track(previous, frame, box, points, self._parameters)
         fast = np.hypot(*self._velocity) > FAST * np.sqrt(box.area)
-        if fast and (flow is None or flow.residual > self._parameters.max_residual):
-            second = median_flow.track(previous, frame, box, points, self._parameters, self._velocity)
-            if flow is None or (second is not None and second.residual < flow.residual):
-                flow = second
+        if fast and (not flows or flows[0].residual > self._parameters.max_residual):
+            again = median_flow.track(previous, frame, box, points, self._parameters, self._velocity)
+            if again and (not flows or again[0].residual < flows[0].residual):
+                flows = again
+        flow = self._most_alike(frame, flows)
         if flow is None or flow.box.inside_fraction(frame.width, frame.height) <= 0.0:
             return None
         self._velocity = (flow.box.center[0] - box.center[0], flow.box.center[1] - box.center[1])
         return flow
+
+    def _most_alike(self, frame: Frame, flows: list[Flow]) -> Flow | None:
+        """Choose between motions by the look of where they lead; the first one has the benefit of doubt."""
+        if len(flows) < 2:
+            return flows[0] if flows else None
+        boxes = np.array([flow.box.as_tuple() for flow in flows])
+        similarity = self._detector.model.positive_similarity(frame.patches(boxes))
+        similarity[0] += FIRST_MARGIN
+        return flows[int(np.argmax(similarity))]
 
     def _fuse(self, frame: Frame, flow: Flow, detections: Detections) -> Result:
         """Decide on the state of the object while there is a tracked box (thesis section 3.1.4)."""
@@ -284,8 +307,12 @@ class Tracker:
         if not self._depth.agrees(box):
             self._drop()
             return LOST
+        witness = Witness.SILENT
+        if self._memory:
+            self._keypoints = self._sift.around(frame, box)
+            witness = self._memory.ask(*self._keypoints, box, trust.learnable)
         weak = trust.provisional
-        if trust.observe(flow.residual, relative, conservative, self._detector.nn_threshold):
+        if trust.observe(flow.residual, relative, conservative, self._detector.nn_threshold, witness):
             self._box = box
             return Result(box, relative, True, trust.valid, "tracker")
         if weak or trust.missed >= parameters.grace_frames:
@@ -302,10 +329,16 @@ class Tracker:
         """Look for the target without a tracked box: exactly one cluster of detections takes over."""
         self._drop()
         clusters = self._clusters(detections)
+        if self._memory:
+            said = {c: self._ask(frame, c.box) for c in clusters[:MAX_ASKED]}
+            sure = [c for c, witness in said.items() if witness is Witness.FOR]
+            if len(sure) == 1:
+                return self._take(sure[0].box, sure[0].confidence)
+            clusters = [c for c in clusters if said.get(c) is not Witness.AGAINST]
         if len(clusters) == 1:
             return self._go_to(clusters[0])
-        if not clusters and self._parameters.tracker == "tld_sift":
-            proposal = self._memory.propose(frame, self._last_box)
+        if not clusters and self._memory:
+            proposal = self._memory.propose(frame, self._last_box, self._trust.missed)
             if proposal is not None and self._depth.agrees(proposal):
                 box, _ = align(frame, self._detector.model, proposal, self._parameters.align_step)
                 relative, conservative = self._similarity(frame, box)
@@ -315,6 +348,10 @@ class Tracker:
                 ):
                     return self._take(box, relative)
         return LOST
+
+    def _ask(self, frame: Frame, box: Box) -> Witness:
+        """Return what the keypoints in a box say of it."""
+        return self._memory.ask(*self._sift.around(frame, box), box, trusted=False)
 
     def _go_to(self, cluster: Cluster) -> Result:
         """Follow a cluster of detections from here: at once if it is sure, else if the next frame agrees."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from tld_follower.tld.parameters import Parameters
+from tld_follower.tld.redetection import Witness
 
 # A weak frame in which the points also part company is worth this many weak frames.
 UNSTEADY_WEIGHT = 2
@@ -14,6 +15,8 @@ class Trust:
 
     The target's look and the motion of its points are two witnesses. A trajectory whose points always moved
     together is the target even where its look is new; once they did not, at an occlusion, the look must do.
+    Keypoints, where the target has them, are a third: recognised, they make up for a weak look; missed, they
+    end the showing of a box in doubt.
 
     Attributes
     ----------
@@ -29,6 +32,7 @@ class Trust:
         self._provisional = False
         self._weak = 0
         self._steady = parameters.confirm_frames
+        self._shown = 0
 
     @property
     def learnable(self) -> bool:
@@ -47,6 +51,7 @@ class Trust:
         self._provisional = provisional
         self._weak = 0
         self._steady = 0
+        self._shown = 0
 
     def drop(self) -> None:
         """End the trajectory."""
@@ -54,7 +59,14 @@ class Trust:
         self._provisional = False
         self._steady = 0
 
-    def observe(self, residual: float, relative: float, conservative: float, accepted: float) -> bool:
+    def observe(
+        self,
+        residual: float,
+        relative: float,
+        conservative: float,
+        accepted: float,
+        witness: Witness = Witness.SILENT,
+    ) -> bool:
         """Take in one tracked frame.
 
         Parameters
@@ -62,6 +74,7 @@ class Trust:
         residual : of the flow, see `median_flow.Flow`.
         relative, conservative : similarities of the tracked box, 0..1.
         accepted : relative similarity at which the detector is sure.
+        witness : what the target's keypoints say, if there are any.
 
         Returns
         -------
@@ -76,20 +89,25 @@ class Trust:
             needed = parameters.lost_threshold
         else:
             needed = parameters.steady_threshold
-        if relative < needed:
-            self._steady = 0
+        if witness is Witness.FOR:
+            needed = min(needed, parameters.steady_threshold)
+        sure = relative > accepted - parameters.redetection_margin
+        if relative < needed or (witness is Witness.AGAINST and self._doubtful and not sure):
+            self._steady = self._shown = 0
             return False
         self._provisional = False
-        sure = relative > accepted - parameters.redetection_margin
-        if sure or not self._doubtful:
+        if sure or not self._doubtful or witness is Witness.FOR:
             self._weak = 0
         else:
             self._weak += 1 if steady else UNSTEADY_WEIGHT
         if self._weak > parameters.patience_frames:
+            self._shown = 0
             return False
         certain = parameters.provisional_threshold if self._doubtful else parameters.lost_threshold
         self._steady = self._steady + 1 if steady and relative >= certain else 0
-        if self._steady > parameters.confirm_frames and (self.valid or relative > accepted):
+        self._shown = self._shown + 1 if steady else 0
+        proven = self.valid or relative > accepted
+        if (self._steady > parameters.confirm_frames and proven) or self._shown > parameters.persist_frames:
             self._doubtful = False
         self.valid = self.valid or conservative > parameters.valid_threshold
         return True

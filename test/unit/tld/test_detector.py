@@ -157,21 +157,21 @@ class TestSiftMemory:
         return Scene(320, 240, (80, 70))
 
     def memory(self, views=3):
-        return SiftMemory(SiftKeypoints(300, 400.0), views, 1)
+        return SiftMemory(SiftKeypoints(300, 96.0), views, 1, 10**6)
 
     def test_proposes_the_target_where_it_came_back(self):
         scene, memory = self.scene(), self.memory()
         first, place = Box(40, 40, 80, 70), Box(180, 110, 96, 84)
         memory.learn(Frame(scene.frame(first), 3.0), first)
-        assert memory.propose(Frame(scene.frame(place), 3.0), first).overlap(place) > 0.8
+        assert memory.propose(Frame(scene.frame(place), 3.0), first, 0).overlap(place) > 0.8
 
     def test_proposes_nothing_without_the_target(self):
         scene, memory = self.scene(), self.memory()
         first = Box(40, 40, 80, 70)
-        assert memory.propose(Frame(scene.frame(first), 3.0), first) is None
+        assert memory.propose(Frame(scene.frame(first), 3.0), first, 0) is None
         memory.learn(Frame(scene.frame(first), 3.0), first)
-        assert memory.propose(Frame(scene.frame(None), 3.0), first) is None
-        assert memory.propose(Frame(np.zeros((240, 320), np.uint8), 3.0), first) is None
+        assert memory.propose(Frame(scene.frame(None), 3.0), first, 0) is None
+        assert memory.propose(Frame(np.zeros((240, 320), np.uint8), 3.0), first, 0) is None
 
     def test_the_first_view_outlives_the_others(self):
         scene, memory = self.scene(), self.memory(views=2)
@@ -179,4 +179,4 @@ class TestSiftMemory:
         memory.learn(Frame(scene.frame(first), 3.0), first)
         for seed in range(20, 24):
             memory.learn(Frame(texture(240, 320, seed), 3.0), first)
-        assert memory.propose(Frame(scene.frame(place), 3.0), first).overlap(place) > 0.8
+        assert memory.propose(Frame(scene.frame(place), 3.0), first, 0).overlap(place) > 0.8

@@ -91,8 +91,8 @@ def test_to_gray_copies():
     ("image", "message"),
     [
         (None, "uint8"),
-        (np.zeros((10, 10)), "uint8, got float64"),
-        (np.zeros((10, 10), np.uint16), "uint8, got uint16"),
+        (np.zeros((10, 10)), "uint16, got float64"),
+        (np.zeros((10, 10), np.int16), "uint16, got int16"),
         (np.zeros((10, 10, 4), np.uint8), "HxWx3"),
         (np.zeros(10, np.uint8), "HxW"),
         (np.zeros((0, 10), np.uint8), "empty"),

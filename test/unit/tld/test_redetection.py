@@ -7,7 +7,7 @@ from synthetic_video import texture
 from tld_follower.box import Box
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.keypoints import SiftKeypoints
-from tld_follower.tld.redetection import SiftMemory
+from tld_follower.tld.redetection import SiftMemory, search_tiles
 
 BLUR = 3.0
 BOX = Box(100.0, 80.0, 80.0, 70.0)
@@ -22,7 +22,7 @@ def moved(image, dx, dy, scale):
 
 
 def memory(views=10, interval=1):
-    return SiftMemory(SiftKeypoints(200, 400.0), views, interval)
+    return SiftMemory(SiftKeypoints(200, 96.0), views, interval, 10**6)
 
 
 def view(seed):
@@ -51,28 +51,28 @@ def test_the_target_is_found_elsewhere_and_in_another_size(motion):
     known = memory()
     known.learn(Frame(view(0), BLUR), BOX)
     frame, truth = elsewhere(0, *motion)
-    assert known.propose(frame, BOX).overlap(truth) > 0.75
+    assert known.propose(frame, BOX, 0).overlap(truth) > 0.75
 
 
 def test_no_proposal_without_the_target():
     known = memory()
     known.learn(Frame(view(0), BLUR), BOX)
     for image in (texture(240, 320, 9), view(1), np.full((240, 320), 255, np.uint8)):
-        assert known.propose(Frame(image, BLUR), BOX) is None
+        assert known.propose(Frame(image, BLUR), BOX, 0) is None
 
 
 def test_no_proposal_without_a_memory():
-    assert memory().propose(Frame(view(0), BLUR), BOX) is None
+    assert memory().propose(Frame(view(0), BLUR), BOX, 0) is None
     blank = memory()
     blank.learn(Frame(np.zeros((240, 320), np.uint8), BLUR), BOX)
-    assert blank.propose(Frame(view(0), BLUR), BOX) is None
+    assert blank.propose(Frame(view(0), BLUR), BOX, 0) is None
 
 
 def test_a_full_memory_keeps_the_first_view_and_the_last_ones():
     known = memory(views=3)
     for seed in range(6):
         known.learn(Frame(view(seed), BLUR), BOX)
-    found = [known.propose(Frame(view(seed), BLUR), BOX) is not None for seed in range(6)]
+    found = [known.propose(Frame(view(seed), BLUR), BOX, 0) is not None for seed in range(6)]
     assert found == [True, False, False, False, True, True]
 
 
@@ -80,5 +80,42 @@ def test_only_one_call_in_an_interval_is_remembered():
     known = memory(interval=3)
     for seed in range(5):
         known.learn(Frame(view(seed), BLUR), BOX)
-    found = [known.propose(Frame(view(seed), BLUR), BOX) is not None for seed in range(5)]
+    found = [known.propose(Frame(view(seed), BLUR), BOX, 0) is not None for seed in range(5)]
     assert found == [True, False, False, True, False]
+
+
+@pytest.mark.parametrize("size", [(320, 240), (640, 480), (1280, 720), (470, 310)])
+@pytest.mark.parametrize("side", [10.0, 60.0, 96.0])
+def test_tiles_hold_the_target_wherever_it_is(size, side):
+    width, height = size
+    target = Box(30.0, 20.0, side, 1.5 * side)
+    tiles = search_tiles(width, height, target, 50000)
+    limit = max(50000.0, 3.0 * side * max(np.sqrt(50000.0), 2.0 * side))
+    assert all(tile.area <= limit + 1e-6 for tile in tiles)
+    assert all(tile.clip(width, height).area == pytest.approx(tile.area) for tile in tiles)
+    rng = np.random.default_rng(0)
+    for x, y in rng.random((200, 2)) * (width - target.width, height - target.height):
+        part = Box(x, y, target.width, target.height)
+        assert any(
+            min(part.right, t.right) - max(x, t.x) >= part.width - 1e-6
+            and min(part.bottom, t.bottom) - max(y, t.y) >= part.height - 1e-6
+            for t in tiles
+        )
+
+
+def test_the_search_begins_where_the_target_was():
+    tiles = search_tiles(1280, 720, Box(900.0, 500.0, 60.0, 60.0), 50000)
+    assert tiles[0].x < 900 < 960 < tiles[0].right
+    assert tiles[0].y < 500 < 560 < tiles[0].bottom
+
+
+def test_a_large_image_is_searched_tile_by_tile():
+    known = SiftMemory(SiftKeypoints(200, 96.0), 10, 1, 20000)
+    known.learn(Frame(view(0), BLUR), BOX)
+    frame, truth = elsewhere(0, 70.0, -30.0, 1.0)
+    turns = len(search_tiles(320, 240, BOX, 20000))
+    found = [known.propose(frame, BOX, turn) for turn in range(2 * turns)]
+    assert turns > 1
+    assert found[:turns] == found[turns:]
+    assert any(box is not None and box.overlap(truth) > 0.75 for box in found)
+    assert any(box is None for box in found)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a robot's tracker meets: reused buffers, other encodings, exits, odd targets and settings."""
 
+import tracemalloc
+
 import cv2
 import numpy as np
 import pytest
@@ -50,8 +52,10 @@ def test_an_image_is_not_written_to():
         lambda gray: np.repeat(gray, 2, axis=1)[:, ::2],
         lambda gray: np.asfortranarray(gray),
         lambda gray: np.broadcast_to(gray[..., None], (*gray.shape, 3)),
+        lambda gray: gray.astype(np.uint16) * 257,
+        lambda gray: cv2.cvtColor(gray.astype(np.uint16) << 8, cv2.COLOR_GRAY2BGR)[:, ::-1][:, ::-1],
     ],
-    ids=["colour", "strided", "fortran", "broadcast"],
+    ids=["colour", "strided", "fortran", "broadcast", "16 bit", "16 bit colour strided"],
 )
 def test_the_same_picture_gives_the_same_result_in_any_layout(name, encode):
     scene = Scene()
@@ -190,3 +194,28 @@ def test_odd_settings_and_targets_crash_nothing(data):
         if result.visible:
             assert result.box.finite
             assert result.box.inside_fraction(width, height) > 0.0
+
+
+@both_trackers
+def test_memory_does_not_grow_over_5000_frames(name):
+    """The target turns, leaves and returns in ever new backgrounds: everything that can fill, does."""
+    limits = {"max_positives": 20, "max_negatives": 30, "sift_views": 3, "sift_interval": 2}
+    scenes = [Scene(96, 72, (24, 20), seed) for seed in range(4)]
+    frames = []
+    for step in range(250):
+        scene = scenes[step // 20 % 4]
+        box = moving_box(step % 25, (10.0, 10.0), (24.0, 20.0))
+        frames.append(scene.frame(None if step % 50 in (45, 46) else box))
+    tracker = Tracker(Parameters(tracker=name, **limits))
+    tracker.init(frames[0], Box(10.0, 10.0, 24.0, 20.0))
+    tracemalloc.start()
+    try:
+        sizes = []
+        for step in range(1, 5000):
+            tracker.update(frames[step % len(frames)])
+            if step % 1000 == 999:
+                sizes.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert tracker.templates <= 50
+    assert sizes[-1] < sizes[0] + 200_000

@@ -191,7 +191,7 @@ class TestRefusals:
 
     def test_images(self):
         with pytest.raises(ValueError, match="uint8"):
-            Tracker().init(self.IMAGE.astype(np.uint16), Box(10, 10, 30, 30))
+            Tracker().init(self.IMAGE.astype(np.int32), Box(10, 10, 30, 30))
 
     def test_update_before_init(self):
         with pytest.raises(RuntimeError, match="init"):
