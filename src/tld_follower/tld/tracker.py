@@ -42,7 +42,8 @@ class Result:
     source: str
 
 
-LEARNING_INSIDE = 0.9
+# Share of the box inside the image under which it is not learnt from, and under which its points prove little.
+LEARNING_INSIDE, SHOWN_INSIDE = 0.9, 0.5
 # A target that moves by less than this share of its side in a frame needs no second guess.
 FAST = 0.1
 # Clusters of detections whose keypoints are asked for in a frame, which takes a millisecond or two each.
@@ -311,6 +312,8 @@ class Tracker:
         if self._memory:
             self._keypoints = self._sift.around(frame, box)
             witness = self._memory.ask(*self._keypoints, box, trust.learnable)
+        if box.inside_fraction(frame.width, frame.height) < SHOWN_INSIDE:
+            trust.doubt()
         weak = trust.provisional
         if trust.observe(flow.residual, relative, conservative, self._detector.nn_threshold, witness):
             self._box = box

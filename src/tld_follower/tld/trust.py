@@ -53,6 +53,10 @@ class Trust:
         self._steady = 0
         self._shown = 0
 
+    def doubt(self) -> None:
+        """Ask for more than steady points from here on: they may be the background's."""
+        self._doubtful = True
+
     def drop(self) -> None:
         """End the trajectory."""
         self.valid = False
