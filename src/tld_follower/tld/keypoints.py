@@ -12,7 +12,7 @@ from tld_follower.tld.frame import Frame
 GRID_MARGIN = 0.05
 DESCRIPTOR = 128
 # Side of the region about a target that is searched for its keypoints, its own being 1.
-REACH = 1.6
+REACH = 1.4
 
 
 def grid(box: Box, side: int) -> np.ndarray:

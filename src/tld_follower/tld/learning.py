@@ -15,6 +15,8 @@ from tld_follower.tld.windows import WindowSize
 
 # The first examples are shown twice, as in Kalal's bootstrap: in the second round trained ferns judge them.
 INITIAL_ROUNDS = 2
+# The texture of noise is larger than any view by at least this [pixel].
+NOISE_ROOM = 64
 
 
 class Learner:
@@ -24,6 +26,16 @@ class Learner:
         self._detector = detector
         self._parameters = parameters
         self._rng = rng
+        self._texture = self._noise_texture()
+
+    def _noise_texture(self) -> np.ndarray:
+        """Make the texture that `_noise` cuts from; no view of the target is larger than two windows."""
+        parameters = self._parameters
+        sizes = np.array([size.grid[1::-1] for size in self._detector.sizes])
+        margin = NOISE_ROOM + 2 * _reach(parameters)
+        height, width = (2.0 * np.ceil(sizes.max(axis=0))).astype(int) + margin
+        noise = np.random.default_rng(0).standard_normal((height, width), np.float32)
+        return cv2.GaussianBlur(noise * np.float32(parameters.warp_noise), (0, 0), parameters.blur)
 
     def initialise(self, frame: Frame, box: Box) -> None:
         """Train on the first frame, and raise both thresholds above half of its background, held out.
@@ -116,27 +128,35 @@ class Learner:
         octave, factor = groups[0][0].octave, groups[0][0].factor
         level = frame.level(octave)
         # The crop holds all windows and the reach of the blur about them.
-        reach = int(np.ceil(2.0 * parameters.blur))
+        reach = _reach(parameters)
         low = np.min([corners.min(axis=0) for _, corners in groups], axis=0) - reach
         high = np.max([corners.max(axis=0) + np.rint(s.grid[:2]) for s, corners in groups], axis=0) + reach
         x0, y0 = np.maximum(low, 0).tolist()
         x1, y1 = np.minimum(high, level.gray.shape[::-1]).astype(int).tolist()
-        crop = level.gray[y0:y1, x0:x1]
         local = [(np.ascontiguousarray(c - [x0, y0], np.int32), s.offsets) for s, c in groups]
         center = np.array(box.center) / factor - [x0, y0] - 0.5
         extent = np.array([box.width, box.height]) / factor
-        codes = [fern_codes(level.blurred[y0:y1, x0:x1], c, o) for c, o in local]
+        view = level.blurred[y0:y1, x0:x1]
+        codes = [fern_codes(view, c, o) for c, o in local]
         for _ in range(warps):
             angle = rng.uniform(-rotation, rotation)
             scale = 1.0 + rng.uniform(-parameters.warp_scale, parameters.warp_scale)
             matrix = cv2.getRotationMatrix2D(center.tolist(), angle, scale)
             matrix[:, 2] += rng.uniform(-parameters.warp_shift, parameters.warp_shift, 2) * extent
-            view = cv2.warpAffine(crop, matrix, crop.shape[::-1], borderMode=cv2.BORDER_REPLICATE)
-            noise = rng.standard_normal(crop.shape, np.float32) * np.float32(parameters.warp_noise)
-            noisy = cv2.add(view, noise, dtype=cv2.CV_8U)
-            blurred = cv2.GaussianBlur(noisy, (0, 0), parameters.blur)
-            codes.extend(fern_codes(blurred, c, o) for c, o in local)
+            warped = cv2.warpAffine(view, matrix, view.shape[::-1], borderMode=cv2.BORDER_REPLICATE)
+            noisy = cv2.add(warped, self._noise(*view.shape), dtype=cv2.CV_8U)
+            codes.extend(fern_codes(noisy, c, o) for c, o in local)
         return codes
+
+    def _noise(self, rows: int, columns: int) -> np.ndarray:
+        """Return blurred noise (rows, columns) float32, another part of the texture in each call.
+
+        Blur and warp commute but for the change of scale, so a warped view of the blurred image with blurred
+        noise stands for the blurred image of a warped, noisy view at a fraction of the cost.
+        """
+        room = (self._texture.shape[0] - rows, self._texture.shape[1] - columns)
+        y, x = (int(self._rng.integers(0, most + 1)) for most in room)
+        return self._texture[y : y + rows, x : x + columns]
 
     def _nearest_windows(self, frame: Frame, box: Box) -> list[tuple[WindowSize, np.ndarray]]:
         """Find the `positive_windows` windows that overlap a box most, at least by `positive_overlap`.
@@ -164,6 +184,11 @@ class Learner:
         limit = max(np.partition(everything, -rank)[-rank], parameters.positive_overlap)
         groups = [(size, corners[shared >= limit]) for size, corners, shared in found]
         return [(size, corners) for size, corners in groups if len(corners)]
+
+
+def _reach(parameters: Parameters) -> int:
+    """How far the blur reaches [pixel of the octave]."""
+    return int(np.ceil(2.0 * parameters.blur))
 
 
 def _corners_near(size: WindowSize, box: Box, frame: Frame) -> np.ndarray:

@@ -20,6 +20,9 @@ MIN_POINTS = 4
 # The background's motion is known from at least so many points that came back to within a pixel.
 MIN_BACKGROUND = 8
 MAX_BACKGROUND_ERROR = 1.0
+# Where the flow fails the target is searched for on an octave where its side is this up to twice it [pixel],
+# and within so many sides.
+SEARCH_SIDE, SEARCH_REACH = 16.0, 2.0
 # Motion apart from it differs by this share of the target's side, for between these shares of the points.
 MIN_APART = 0.02
 MIN_SHARE, MAX_SHARE = 0.15, 0.9
@@ -95,7 +98,7 @@ def track(
     few points were found or their median error exceeds `max_fb_error`.
     """
     if len(points) < MIN_POINTS:
-        return None
+        return []
     side = np.sqrt(box.area)
     # A large target is tracked on a smaller octave: the same points, a wider reach, bounded cost.
     octave = max(0, int(np.floor(np.log2(side / parameters.flow_side))))
@@ -112,6 +115,30 @@ def track(
     apart = _apart(own, around[around.error < MAX_BACKGROUND_ERROR], MIN_APART * side / factor)
     answers = [solve(own), solve(own[apart]) if apart.any() else None]
     return [flow for flow in answers if flow is not None]
+
+
+def search(previous: Frame, current: Frame, box: Box) -> tuple[float, float]:
+    """Find about where the target went by the NCC of its picture, further than the flow can reach.
+
+    Returns
+    -------
+    displacement [pixel], a multiple of the pixel of the octave searched; 0 where there is nothing to compare.
+    """
+    octave = max(0, int(np.floor(np.log2(np.sqrt(box.area) / SEARCH_SIDE))))
+    before, after = previous.level(octave).gray, current.level(octave).gray
+    factor = round(previous.height / before.shape[0])
+    height, width = before.shape
+    inside = Box(*(v / factor for v in box.as_tuple())).clip(width, height)
+    x0, y0, x1, y1 = (round(v) for v in (inside.x, inside.y, inside.right, inside.bottom))
+    template = before[y0:y1, x0:x1]
+    if min(template.shape) < 4 or template.std() < 1.0:
+        return 0.0, 0.0
+    reach = round(SEARCH_REACH * np.sqrt(box.area) / factor)
+    left, top = max(0, x0 - reach), max(0, y0 - reach)
+    area = after[top : y1 + reach, left : x1 + reach]
+    scores = cv2.matchTemplate(area, template, cv2.TM_CCOEFF_NORMED)
+    y, x = np.unravel_index(int(np.argmax(scores)), scores.shape)
+    return float(left + x - x0) * factor, float(top + y - y0) * factor
 
 
 def surroundings(box: Box) -> np.ndarray:

@@ -49,6 +49,7 @@ class Parameters:
 
     nn_threshold: float = 0.65
     redetection_margin: float = 0.07
+    redetection_reach: float = 1.0
     min_conservative: float = 0.47
     positive_threshold: float = 0.8
     negative_threshold: float = 0.5
@@ -67,7 +68,7 @@ class Parameters:
     warp_noise: float = 5.0
     initial_negatives: int = 100
 
-    valid_threshold: float = 0.7
+    valid_threshold: float = 0.62
     lost_threshold: float = 0.5
     steady_threshold: float = 0.4
     provisional_threshold: float = 0.58
@@ -87,7 +88,7 @@ class Parameters:
 
     sift_keypoints: int = 200
     sift_side: float = 96.0
-    sift_pixels: int = 50000
+    sift_pixels: int = 25000
     sift_views: int = 10
     sift_interval: int = 10
 

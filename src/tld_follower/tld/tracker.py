@@ -42,12 +42,13 @@ class Result:
     source: str
 
 
-# Share of the box inside the image under which it is not learnt from, and under which its points prove little.
+# Shares of the box inside the image: under the first it is not learnt from, under the second its steady
+# points prove little.
 LEARNING_INSIDE, SHOWN_INSIDE = 0.9, 0.5
-# A target that moves by less than this share of its side in a frame needs no second guess.
-FAST = 0.1
 # Clusters of detections whose keypoints are asked for in a frame, which takes a millisecond or two each.
 MAX_ASKED = 3
+# First step of the search that fits a detected box to the target [share of its sides].
+DETECTED_STEP = 0.1
 # A second motion must lead to a view that is more alike by this.
 FIRST_MARGIN = 0.035
 LOST = Result(None, 0.0, False, False, "none")
@@ -137,7 +138,6 @@ class Tracker:
         self._frame = frame
         self._box: Box | None = box
         self._first_box = self._last_box = box
-        self._velocity = (0.0, 0.0)
         # Of the frame seen last, about the box: (N, 2) and (N, 128).
         self._keypoints: tuple[np.ndarray, np.ndarray] | None = None
         self._trust = Trust(parameters)
@@ -259,7 +259,7 @@ class Tracker:
         self._last_box = replace(self._last_box, x=self._last_box.x + shift)
 
     def _track(self, frame: Frame) -> Flow | None:
-        """Follow the box by median flow; where that fails, once more from the speed that it had."""
+        """Follow the box by median flow; where that fails, once more from where it is seen again."""
         box, previous = self._box, self._frame
         if box is None:
             return None
@@ -272,15 +272,14 @@ class Tracker:
             points = keypoints.grid(box, side)
         points = self._depth.uncovered(points)
         flows = median_flow.track(previous, frame, box, points, self._parameters)
-        fast = np.hypot(*self._velocity) > FAST * np.sqrt(box.area)
-        if fast and (not flows or flows[0].residual > self._parameters.max_residual):
-            again = median_flow.track(previous, frame, box, points, self._parameters, self._velocity)
+        if not flows or flows[0].residual > self._parameters.max_residual:
+            guess = median_flow.search(previous, frame, box)
+            again = median_flow.track(previous, frame, box, points, self._parameters, guess)
             if again and (not flows or again[0].residual < flows[0].residual):
                 flows = again
         flow = self._most_alike(frame, flows)
         if flow is None or flow.box.inside_fraction(frame.width, frame.height) <= 0.0:
             return None
-        self._velocity = (flow.box.center[0] - box.center[0], flow.box.center[1] - box.center[1])
         return flow
 
     def _most_alike(self, frame: Frame, flows: list[Flow]) -> Flow | None:
@@ -304,7 +303,7 @@ class Tracker:
             if cluster.confidence > sure and cluster.box.overlap(flow.box) < parameters.takeover_overlap
         ]
         if len(rivals) == 1:
-            return self._take(rivals[0].box, rivals[0].confidence)
+            return self._take(self._fit(frame, rivals[0].box), rivals[0].confidence)
         if not self._depth.agrees(box):
             self._drop()
             return LOST
@@ -336,14 +335,14 @@ class Tracker:
             said = {c: self._ask(frame, c.box) for c in clusters[:MAX_ASKED]}
             sure = [c for c, witness in said.items() if witness is Witness.FOR]
             if len(sure) == 1:
-                return self._take(sure[0].box, sure[0].confidence)
+                return self._take(self._fit(frame, sure[0].box), sure[0].confidence)
             clusters = [c for c in clusters if said.get(c) is not Witness.AGAINST]
         if len(clusters) == 1:
-            return self._go_to(clusters[0])
+            return self._go_to(frame, clusters[0])
         if not clusters and self._memory:
             proposal = self._memory.propose(frame, self._last_box, self._trust.missed)
             if proposal is not None and self._depth.agrees(proposal):
-                box, _ = align(frame, self._detector.model, proposal, self._parameters.align_step)
+                box = self._fit(frame, proposal)
                 relative, conservative = self._similarity(frame, box)
                 if (
                     relative > self._detector.nn_threshold - self._parameters.redetection_margin
@@ -356,27 +355,34 @@ class Tracker:
         """Return what the keypoints in a box say of it."""
         return self._memory.ask(*self._sift.around(frame, box), box, trusted=False)
 
-    def _go_to(self, cluster: Cluster) -> Result:
-        """Follow a cluster of detections from here: at once if it is sure, else if the next frame agrees."""
+    def _fit(self, frame: Frame, box: Box) -> Box:
+        """Fit a detected box to the target: windows are a whole scale step apart."""
+        return align(frame, self._detector.model, box, DETECTED_STEP)[0]
+
+    def _go_to(self, frame: Frame, cluster: Cluster) -> Result:
+        """Follow a cluster of detections from here: at once if it is sure.
+
+        Else the next frame must agree; and it must be of about the target's size, where that can have got to.
+        """
         if cluster.confidence > self._detector.nn_threshold:
-            return self._take(cluster.box, cluster.confidence)
-        change = abs(np.log(cluster.box.width / self._last_box.width))
-        if change < self._parameters.tracking_scales * np.log(self._parameters.scale_step):
-            self._box = cluster.box
-            self._velocity = (0.0, 0.0)
+            return self._take(self._fit(frame, cluster.box), cluster.confidence)
+        parameters, last = self._parameters, self._last_box
+        change = abs(np.log(cluster.box.width / last.width))
+        distance = np.hypot(*np.subtract(cluster.box.center, last.center))
+        reach = parameters.redetection_reach * np.sqrt(last.area) * (1 + self._trust.missed)
+        if change < parameters.tracking_scales * np.log(parameters.scale_step) and distance < reach:
+            self._box = self._fit(frame, cluster.box)
             self._trust.restart(provisional=True)
         return LOST
 
     def _take(self, box: Box, confidence: float) -> Result:
         """Go on from a box that the detector found."""
         self._box = box
-        self._velocity = (0.0, 0.0)
         self._trust.restart(provisional=False)
         return Result(box, confidence, True, False, "detector")
 
     def _drop(self) -> None:
         self._box = None
-        self._velocity = (0.0, 0.0)
         self._trust.drop()
 
     def _similarity(self, frame: Frame, box: Box) -> tuple[float, float]:
