@@ -27,7 +27,7 @@ class Parameters:
     min_side: float = 8.0
 
     grid_points: int = 10
-    lk_window: int = 9
+    lk_window: int = 11
     lk_levels: int = 3
     flow_side: float = 32.0
     flow_patch: int = 10

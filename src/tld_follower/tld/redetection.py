@@ -17,7 +17,7 @@ from tld_follower.tld.frame import Frame
 from tld_follower.tld.keypoints import SiftKeypoints
 
 RATIO = 0.75
-MIN_MATCHES = 5
+MIN_MATCHES = 4
 MAX_ERROR = 0.08
 
 # A witness's keypoints match less strictly, but lie within this share of the target's side of their places.
@@ -29,6 +29,8 @@ MIN_WITNESSES, ENOUGH = 3, 0.5
 MIN_EXPECTED, TOO_FEW = 4.0, 0.2
 # Of the first view's keypoints so many are expected again; later it is what trusted boxes showed.
 FIRST_SHARE, EXPECTATION_RATE = 0.4, 0.05
+# Views that make a memory mature.
+MATURE_VIEWS = 3
 
 
 class Witness(IntEnum):
@@ -82,6 +84,11 @@ class SiftMemory:
     def restore(self, calls: int, expected: float, views: list[tuple[np.ndarray, np.ndarray]]) -> None:
         """Take over the `state` of another memory."""
         self._calls, self._expected, self._views = calls, expected, list(views)
+
+    @property
+    def mature(self) -> bool:
+        """True once several looks are known: a single one says nothing of the target's other sides."""
+        return len(self._views) >= MATURE_VIEWS
 
     def ask(self, points: np.ndarray, descriptors: np.ndarray, box: Box, trusted: bool) -> Witness:
         """Judge a box by the keypoints about it.

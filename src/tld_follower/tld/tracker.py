@@ -336,18 +336,17 @@ class Tracker:
             sure = [c for c, witness in said.items() if witness is Witness.FOR]
             if len(sure) == 1:
                 return self._take(self._fit(frame, sure[0].box), sure[0].confidence)
-            clusters = [c for c in clusters if said.get(c) is not Witness.AGAINST]
+            if self._memory.mature:
+                clusters = [c for c in clusters if said.get(c) is not Witness.AGAINST]
         if len(clusters) == 1:
             return self._go_to(frame, clusters[0])
         if not clusters and self._memory:
             proposal = self._memory.propose(frame, self._last_box, self._trust.missed)
             if proposal is not None and self._depth.agrees(proposal):
                 box = self._fit(frame, proposal)
-                relative, conservative = self._similarity(frame, box)
-                if (
-                    relative > self._detector.nn_threshold - self._parameters.redetection_margin
-                    and conservative > self._parameters.min_conservative
-                ):
+                relative, _ = self._similarity(frame, box)
+                # Keypoints in their places speak for it already: the look must only not speak against it.
+                if relative > self._parameters.lost_threshold:
                     return self._take(box, relative)
         return LOST
 
