@@ -17,7 +17,7 @@ from tld_follower.tld.frame import Frame
 from tld_follower.tld.keypoints import SiftKeypoints
 
 RATIO = 0.75
-MIN_MATCHES = 4
+MIN_MATCHES = 5
 MAX_ERROR = 0.08
 
 # A witness's keypoints match less strictly, but lie within this share of the target's side of their places.

@@ -344,9 +344,11 @@ class Tracker:
             proposal = self._memory.propose(frame, self._last_box, self._trust.missed)
             if proposal is not None and self._depth.agrees(proposal):
                 box = self._fit(frame, proposal)
-                relative, _ = self._similarity(frame, box)
-                # Keypoints in their places speak for it already: the look must only not speak against it.
-                if relative > self._parameters.lost_threshold:
+                relative, conservative = self._similarity(frame, box)
+                if (
+                    relative > self._detector.nn_threshold - self._parameters.redetection_margin
+                    and conservative > self._parameters.min_conservative
+                ):
                     return self._take(box, relative)
         return LOST
 
@@ -392,15 +394,18 @@ class Tracker:
     def _refine(self, frame: Frame, flow: Flow, detections: Detections) -> Box:
         """Correct the tracked box by the detections that agree with it, then by the model itself.
 
-        The box weighs `fusion_weight`, each detection 1 (Kalal 2012). The model's correction is the smaller
+        The box's centre weighs `fusion_weight`, that of each detection 1 (Kalal 2012); its size stays, for the
+        windows' sizes are a whole scale step apart and pull it down step by step. The model's correction is the smaller
         the better the flow held together: then the tracker is the more precise of the two.
         """
         parameters = self._parameters
         tracked = np.array(flow.box.as_tuple())
         near = overlaps(detections.boxes, tracked) > parameters.fusion_overlap
         near &= detections.similarity.relative > self._detector.nn_threshold
-        total = parameters.fusion_weight * tracked + detections.boxes[near].sum(axis=0)
-        box = Box(*map(float, total / (parameters.fusion_weight + np.count_nonzero(near))))
+        centers = detections.boxes[near, :2] + 0.5 * detections.boxes[near, 2:]
+        total = parameters.fusion_weight * np.array(flow.box.center) + centers.sum(axis=0)
+        center = total / (parameters.fusion_weight + np.count_nonzero(near))
+        box = Box.from_center(*map(float, center), flow.box.width, flow.box.height)
         aligned, similarity = align(frame, self._detector.model, box, parameters.align_step)
         if similarity < parameters.align_similarity:
             return box
