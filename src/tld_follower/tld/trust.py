@@ -33,6 +33,7 @@ class Trust:
         self._weak = 0
         self._steady = parameters.confirm_frames
         self._shown = 0
+        self._alike = 0
 
     @property
     def learnable(self) -> bool:
@@ -52,6 +53,7 @@ class Trust:
         self._weak = 0
         self._steady = 0
         self._shown = 0
+        self._alike = 0
 
     def doubt(self) -> None:
         """Ask for more than steady points from here on: they may be the background's."""
@@ -97,7 +99,7 @@ class Trust:
             needed = min(needed, parameters.steady_threshold)
         sure = relative > accepted - parameters.redetection_margin
         if relative < needed or (witness is Witness.AGAINST and self._doubtful and not sure):
-            self._steady = self._shown = 0
+            self._steady = self._shown = self._alike = 0
             return False
         self._provisional = False
         if sure or not self._doubtful or witness is Witness.FOR:
@@ -113,7 +115,8 @@ class Trust:
         proven = self.valid or relative > accepted
         if (self._steady > parameters.confirm_frames and proven) or self._shown > parameters.persist_frames:
             self._doubtful = False
-        self.valid = self.valid or conservative > parameters.valid_threshold
+        self._alike = self._alike + 1 if conservative > parameters.valid_threshold else 0
+        self.valid = self.valid or self._alike >= parameters.confirm_frames
         return True
 
     @property
