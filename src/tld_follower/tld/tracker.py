@@ -395,8 +395,8 @@ class Tracker:
         """Correct the tracked box by the detections that agree with it, then by the model itself.
 
         The box's centre weighs `fusion_weight`, that of each detection 1 (Kalal 2012). Its size stays: the
-        windows' sizes are a whole scale step apart and would pull it down step by step. The model's correction
-        is the smaller the better the flow held together: then the tracker is the more precise of the two.
+        windows' sizes are a whole scale step apart and would pull it down step by step. The model corrects it
+        the less the better the flow held together: then the tracker is the more precise of the two.
         """
         parameters = self._parameters
         tracked = np.array(flow.box.as_tuple())

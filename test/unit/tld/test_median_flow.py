@@ -11,7 +11,7 @@ from synthetic_video import Scene, texture
 from tld_follower.box import Box
 from tld_follower.tld import keypoints
 from tld_follower.tld.frame import Frame
-from tld_follower.tld.median_flow import median_scale, patch_ncc, track
+from tld_follower.tld.median_flow import median_scale, patch_ncc, search, track
 from tld_follower.tld.parameters import Parameters
 
 PARAMETERS = Parameters()
@@ -48,6 +48,24 @@ def test_a_guess_widens_the_reach():
     missed = flow(scene, before, moved)
     assert missed is None or missed.box.overlap(moved) < 0.5
     assert flow(scene, before, moved, (68.0, 36.0)).box.overlap(moved) > 0.9
+
+
+@pytest.mark.parametrize("side", [20, 60, 150])
+@pytest.mark.parametrize(("dx", "dy"), [(1.2, -0.4), (-1.7, 1.1), (0.0, 0.0)])
+def test_a_target_is_seen_again_within_two_sides(side, dx, dy):
+    scene = Scene(900, 700, (side, side))
+    before = Box(330.0, 270.0, side, side)
+    moved = Box(330.0 + dx * side, 270.0 + dy * side, side, side)
+    found = search(Frame(scene.frame(before), 3.0), Frame(scene.frame(moved), 3.0), before)
+    assert found == pytest.approx((dx * side, dy * side), abs=0.08 * side + 1.0)
+
+
+@pytest.mark.parametrize(
+    "box", [Box(-50, -50, 30, 30), Box(70, 50, 40, 40), Box(30, 30, 3, 3), Box(10, 10, 60, 40)]
+)
+def test_a_search_without_a_picture_says_no_move(box):
+    blank = Frame(np.full((60, 80), 90, np.uint8), 3.0)
+    assert search(blank, Frame(texture(60, 80, 1), 3.0), box) == (0.0, 0.0)
 
 
 def test_no_flow_where_the_target_vanished():

@@ -7,7 +7,7 @@ from synthetic_video import texture
 from tld_follower.box import Box
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.keypoints import SiftKeypoints
-from tld_follower.tld.redetection import SiftMemory, search_tiles
+from tld_follower.tld.redetection import MATURE_VIEWS, SiftMemory, Witness, search_tiles
 
 BLUR = 3.0
 BOX = Box(100.0, 80.0, 80.0, 70.0)
@@ -82,6 +82,46 @@ def test_only_one_call_in_an_interval_is_remembered():
         known.learn(Frame(view(seed), BLUR), BOX)
     found = [known.propose(Frame(view(seed), BLUR), BOX, 0) is not None for seed in range(5)]
     assert found == [True, False, False, True, False]
+
+
+def asked(known, frame, box):
+    return known.ask(*SiftKeypoints(200, 96.0).around(frame, box), box, trusted=False)
+
+
+def test_the_keypoints_speak_for_the_target_and_against_another():
+    known = memory()
+    known.learn(Frame(view(0), BLUR), BOX)
+    frame, truth = elsewhere(0, 70.0, -30.0, 1.0)
+    assert asked(known, frame, truth) is Witness.FOR
+    assert asked(known, Frame(view(1), BLUR), BOX) is Witness.AGAINST
+    # The same keypoints in other places are no target.
+    assert asked(known, frame, Box(truth.x - 60.0, truth.y, truth.width, truth.height)) is Witness.AGAINST
+
+
+def test_a_target_without_keypoints_says_nothing():
+    blank = Frame(np.full((240, 320), 90, np.uint8), BLUR)
+    known = memory()
+    assert asked(known, blank, BOX) is Witness.SILENT
+    known.learn(blank, BOX)
+    assert asked(known, Frame(view(0), BLUR), BOX) is Witness.SILENT
+
+
+def test_what_trusted_boxes_show_is_expected():
+    known, blank = memory(), Frame(np.full((240, 320), 90, np.uint8), BLUR)
+    known.learn(Frame(view(0), BLUR), BOX)
+    assert asked(known, blank, BOX) is Witness.AGAINST
+    nothing = SiftKeypoints(200, 96.0).around(blank, BOX)
+    for _ in range(100):
+        known.ask(*nothing, BOX, trusted=True)
+    assert asked(known, blank, BOX) is Witness.SILENT
+
+
+def test_a_memory_matures_with_its_views():
+    known = memory()
+    for seed in range(MATURE_VIEWS):
+        assert not known.mature
+        known.learn(Frame(view(seed), BLUR), BOX)
+    assert known.mature
 
 
 @pytest.mark.parametrize("size", [(320, 240), (640, 480), (1280, 720), (470, 310)])

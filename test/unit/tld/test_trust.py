@@ -2,6 +2,7 @@
 import pytest
 
 from tld_follower.tld.parameters import Parameters
+from tld_follower.tld.redetection import Witness
 from tld_follower.tld.trust import Trust
 
 PARAMETERS = Parameters()
@@ -15,8 +16,8 @@ def trust():
     return Trust(PARAMETERS)
 
 
-def observe(trust, residual, relative, conservative=0.0):
-    return trust.observe(residual, relative, conservative, SURE)
+def observe(trust, residual, relative, conservative=0.0, witness=Witness.SILENT):
+    return trust.observe(residual, relative, conservative, SURE, witness)
 
 
 def test_a_steady_trajectory_may_look_strange(trust):
@@ -53,13 +54,42 @@ def test_only_steady_frames_of_a_valid_trajectory_teach(trust):
     assert not trust.learnable
 
 
-def test_the_model_validates_a_new_trajectory(trust):
+def test_the_model_validates_a_new_trajectory_after_some_frames_alike(trust):
+    alike, other = PARAMETERS.valid_threshold + 0.01, PARAMETERS.valid_threshold - 0.01
     trust.restart(provisional=False)
-    assert not trust.valid
-    observe(trust, STEADY, SURE + 0.01, conservative=PARAMETERS.valid_threshold - 0.01)
-    assert not trust.valid
-    observe(trust, STEADY, SURE + 0.01, conservative=PARAMETERS.valid_threshold + 0.01)
+    for conservative in [*[alike] * (PARAMETERS.confirm_frames - 1), other]:
+        observe(trust, STEADY, SURE + 0.01, conservative)
+        assert not trust.valid
+    for _ in range(PARAMETERS.confirm_frames):
+        observe(trust, STEADY, SURE + 0.01, alike)
     assert trust.valid
+
+
+def test_a_long_steady_trajectory_is_believed_whatever_its_look(trust):
+    weak = PARAMETERS.provisional_threshold - 0.01
+    trust.restart(provisional=False)
+    for _ in range(PARAMETERS.persist_frames + 1):
+        assert observe(trust, STEADY, SURE + 0.01)
+    assert all(observe(trust, STEADY, weak) for _ in range(3 * PARAMETERS.patience_frames))
+
+
+def test_a_box_that_leaves_the_image_needs_more_than_steady_points(trust):
+    assert observe(trust, STEADY, STRANGE)
+    trust.doubt()
+    assert not observe(trust, STEADY, STRANGE)
+
+
+def test_keypoints_make_up_for_a_weak_look(trust):
+    observe(trust, UNSTEADY, SURE + 0.01)
+    assert all(observe(trust, UNSTEADY, STRANGE, witness=Witness.FOR) for _ in range(20))
+
+
+def test_missing_keypoints_end_the_showing_of_a_weak_box_in_doubt(trust):
+    weak = PARAMETERS.lost_threshold + 0.01
+    assert observe(trust, STEADY, weak, witness=Witness.AGAINST)
+    observe(trust, UNSTEADY, SURE + 0.01)
+    assert not observe(trust, STEADY, weak, witness=Witness.AGAINST)
+    assert observe(trust, STEADY, SURE + 0.01, witness=Witness.AGAINST)
 
 
 def test_a_weak_detection_needs_the_next_frame(trust):
