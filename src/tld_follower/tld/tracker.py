@@ -44,7 +44,7 @@ class Result:
 
 # Shares of the box inside the image: under the first it is not learnt from, under the second its steady
 # points prove little.
-LEARNING_INSIDE, SHOWN_INSIDE = 0.9, 0.5
+LEARNING_INSIDE, SHOWN_INSIDE = 0.9, 0.3
 # Clusters of detections whose keypoints are asked for in a frame, which takes a millisecond or two each.
 MAX_ASKED = 3
 # First step of the search that fits a detected box to the target [share of its sides].
