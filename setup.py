@@ -8,6 +8,7 @@ setup(
         packages=[
             "tld_follower",
             "tld_follower.evaluation",
+            "tld_follower.evaluation.bench",
             "tld_follower.following",
             "tld_follower.nodes",
             "tld_follower.tld",
