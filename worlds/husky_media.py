@@ -10,28 +10,11 @@ from obj import Obj
 
 YELLOW = (18, 178, 238)
 BLACK = (34, 32, 31)
-MUD = (62, 84, 104)
 
 # The chassis, in the frame of base_link: x forward, z up from 0.132 m above the ground.
 HALF_LENGTH, HALF_WIDTH = 0.4937, 0.28545
 BUMPER_TOP, DECK, RAIL_TOP = 0.1237, 0.2175, 0.2475
 WHEEL_RADIUS, WHEEL_WIDTH, CORE_RADIUS = 0.1651, 0.1143, 0.146
-
-
-def _weather(rng, image, mud, fine=1.0):
-    """Wear the paint: stains of every size, stone chips, scratches, mud from below."""
-    height, width = image.shape[:2]
-    paint.tint(
-        image,
-        paint.fractal(rng, height, width, {110: 0.06, 44: 0.08, 18: 0.09, 8: 0.11 * fine, 4: 0.09 * fine}),
-    )
-    area = height * width / 1e6
-    paint.spots(rng, image, int(900 * area), (1.5, 14), (26, 30, 34), (0.35, 0.95), 3)
-    paint.spots(rng, image, int(500 * area), (1.5, 9), (190, 204, 210), (0.3, 0.8), 3)
-    paint.spots(rng, image, int(260 * area), (3, 24), MUD, (0.4, 0.9), 3)
-    paint.scratches(rng, image, int(160 * area), (10, 90), (150, 160, 165), 0.7)
-    paint.scratches(rng, image, int(120 * area), (10, 70), (20, 22, 24), 0.7)
-    paint.grime(rng, image, MUD, mud, 90)
 
 
 def shell():
@@ -66,9 +49,9 @@ def shell():
     for x in (150, 874):
         cv2.circle(front, (x, 128), 66, (0.1, 0.1, 0.1), -1, cv2.LINE_AA)
         cv2.circle(front, (x, 128), 50, (0.92, 0.95, 0.96), -1, cv2.LINE_AA)
-    _weather(rng, image, 0.0)
+    paint.weather(rng, image, 0.0)
     for strip in (side, rear, front):
-        paint.grime(rng, strip, MUD, 0.45, 90)
+        paint.grime(rng, strip, paint.MUD, 0.45, 90)
     return image
 
 
@@ -76,7 +59,7 @@ def black():
     """Powder-coated metal and plastic; one repeat is 0.5 m."""
     rng = np.random.default_rng(32)
     image = paint.flat(512, 512, (52, 50, 48))
-    _weather(rng, image, 0.35, 1.6)
+    paint.weather(rng, image, 0.35, 1.6)
     return image
 
 
@@ -94,7 +77,7 @@ def bumper():
         cv2.rectangle(image, (x + 6, 156), (x + 82, 164), (0.35, 0.35, 0.95), -1)
     paint.stripes(image, 350, 146, 320, 60, 32, ((24, 24, 24), YELLOW))
     paint.label(image, "CAUTION", 396, 84, 50, (210, 214, 216), 7)
-    _weather(rng, image, 0.4, 1.6)
+    paint.weather(rng, image, 0.4, 1.6)
     return image
 
 
@@ -118,7 +101,7 @@ def deck():
     for x in range(30, 1024, 107):
         paint.bolt(image, x, 60, 11)
         paint.bolt(image, x, 964, 11)
-    _weather(rng, image, 0.0, 1.3)
+    paint.weather(rng, image, 0.0, 1.3)
     return image
 
 
@@ -131,7 +114,7 @@ def rail():
     for x in (40, 168):
         paint.bolt(image, x, 64, 12)
     paint.tint(image, paint.fractal(rng, 128, 256, {60: 0.08, 16: 0.1, 5: 0.12}))
-    paint.spots(rng, image, 50, (2, 12), MUD)
+    paint.spots(rng, image, 50, (2, 12), paint.MUD)
     return image
 
 
@@ -157,7 +140,7 @@ def tyre():
         angle = np.radians(turn)
         mark = (int(768 + 216 * np.cos(angle)), int(256 + 216 * np.sin(angle)))
         cv2.circle(image, mark, 5, (0.7, 0.7, 0.7), -1, cv2.LINE_AA)
-    paint.spots(rng, image, 160, (2, 14), MUD, (0.3, 0.8), 2)
+    paint.spots(rng, image, 160, (2, 14), paint.MUD, (0.3, 0.8), 2)
     return image
 
 

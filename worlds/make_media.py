@@ -5,6 +5,7 @@
 import sys
 from pathlib import Path
 
+import drone_media
 import ground_media
 import husky_media
 import obstacle_media
@@ -16,7 +17,7 @@ def main():
         sys.exit("usage: make_media.py DIRECTORY")
     directory = Path(sys.argv[1])
     directory.mkdir(parents=True, exist_ok=True)
-    for module in (ground_media, obstacle_media, husky_media):
+    for module in (ground_media, obstacle_media, husky_media, drone_media):
         module.write(directory)
 
 

@@ -7,6 +7,8 @@ Images are float32 arrays of shape (height, width, 3), blue-green-red as OpenCV 
 import cv2
 import numpy as np
 
+MUD = (62, 84, 104)
+
 
 def flat(height, width, bgr):
     """Return a plane colour; `bgr` is three numbers 0..255."""
@@ -118,6 +120,22 @@ def grime(rng, image, bgr, strength, coarse=60):
     patches = fractal(rng, height, width, {coarse: 0.5, coarse / 3: 0.35, coarse / 10: 0.3})
     low = np.linspace(-0.6, 0.9, height, dtype=np.float32)[:, None]
     blend(image, bgr, strength * np.clip(patches + low, 0, 1.2))
+
+
+def weather(rng, image, mud, fine=1.0):
+    """Wear paint outdoors: stains of every size, stone chips, scratches, mud from below."""
+    height, width = image.shape[:2]
+    tint(
+        image,
+        fractal(rng, height, width, {110: 0.06, 44: 0.08, 18: 0.09, 8: 0.11 * fine, 4: 0.09 * fine}),
+    )
+    area = height * width / 1e6
+    spots(rng, image, int(900 * area), (1.5, 14), (26, 30, 34), (0.35, 0.95), 3)
+    spots(rng, image, int(500 * area), (1.5, 9), (190, 204, 210), (0.3, 0.8), 3)
+    spots(rng, image, int(260 * area), (3, 24), MUD, (0.4, 0.9), 3)
+    scratches(rng, image, int(160 * area), (10, 90), (150, 160, 165), 0.7)
+    scratches(rng, image, int(120 * area), (10, 70), (20, 22, 24), 0.7)
+    grime(rng, image, MUD, mud, 90)
 
 
 def bolt(image, x, y, radius):

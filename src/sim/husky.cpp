@@ -25,8 +25,8 @@ Husky::Husky(const HuskyParameters& parameters, const Robot& robot, const btTran
   for (const RobotLink& link : robot.links) {
     if (!link.moving) rigid.push_back(&link);
   }
-  chassis_ = physics->AddBody(rigid, pose);
-  const btMatrix3x3 to_chassis = chassis_.rigid->getWorldTransform().getBasis().transpose();
+  parts_.push_back({physics->AddBody(rigid, pose), rigid});
+  const btMatrix3x3 to_chassis = body().rigid->getWorldTransform().getBasis().transpose();
   for (size_t w = 0; w < kJoints.size(); ++w) {
     const RobotLink& link = robot.MovedBy(kJoints[w]);
     if (link.collisions.size() != 1 ||
@@ -34,9 +34,9 @@ Husky::Husky(const HuskyParameters& parameters, const Robot& robot, const btTran
       throw std::runtime_error("wheel '" + link.name + "' needs one cylinder as <collision>");
     }
     const btVector3 axis = pose.getBasis() * link.pose.getBasis() * link.axis;
-    wheels_[w].joint = kJoints[w];
-    wheels_[w].body = physics->AddBody({&link}, pose);
-    motors_[w] = physics->AddHinge(chassis_, wheels_[w].body, pose * link.pose.getOrigin(), axis);
+    wheels_[w].name = kJoints[w];
+    parts_.push_back({physics->AddBody({&link}, pose), {&link}});
+    motors_[w] = physics->AddHinge(body(), parts_.back().body, pose * link.pose.getOrigin(), axis);
     axes_[w] = to_chassis * axis;
     wheel_radius_ = link.collisions.front().geometry.size.x();
   }
@@ -45,9 +45,10 @@ Husky::Husky(const HuskyParameters& parameters, const Robot& robot, const btTran
                                            robot.MovedBy(kJoints[1]).pose.getOrigin().y());
 }
 
-bool Husky::Command(double speed, double yaw_rate, double time) {
-  const bool finite = std::isfinite(speed) && std::isfinite(yaw_rate);
-  command_speed_ = finite ? std::clamp(speed, -parameters_.max_speed, parameters_.max_speed) : 0.0;
+bool Husky::Command(const std::array<double, 3>& velocity, double yaw_rate, double time) {
+  const bool finite = std::isfinite(velocity[0]) && std::isfinite(yaw_rate);
+  command_speed_ =
+      finite ? std::clamp(velocity[0], -parameters_.max_speed, parameters_.max_speed) : 0.0;
   command_yaw_rate_ =
       finite ? std::clamp(yaw_rate, -parameters_.max_yaw_rate, parameters_.max_yaw_rate) : 0.0;
   command_time_ = time;
@@ -69,21 +70,30 @@ void Husky::Actuate(double time) {
 }
 
 void Husky::Measure() {
-  const btMatrix3x3& attitude = chassis_.rigid->getWorldTransform().getBasis();
+  const btMatrix3x3& attitude = body().rigid->getWorldTransform().getBasis();
   for (size_t w = 0; w < wheels_.size(); ++w) {
     const btVector3 relative =
-        wheels_[w].body.rigid->getAngularVelocity() - chassis_.rigid->getAngularVelocity();
+        parts_[w + 1].body.rigid->getAngularVelocity() - body().rigid->getAngularVelocity();
     wheels_[w].speed = (attitude * axes_[w]).dot(relative);
     wheels_[w].angle += wheels_[w].speed * Physics::kStep;
   }
   const double left = wheel_radius_ * (wheels_[0].speed + wheels_[2].speed) / 2;
   const double right = wheel_radius_ * (wheels_[1].speed + wheels_[3].speed) / 2;
-  odometry_.speed = (left + right) / 2;
-  odometry_.yaw_rate = (right - left) / separation_;
-  const double middle_yaw = odometry_.yaw + odometry_.yaw_rate * Physics::kStep / 2;
-  odometry_.x += odometry_.speed * std::cos(middle_yaw) * Physics::kStep;
-  odometry_.y += odometry_.speed * std::sin(middle_yaw) * Physics::kStep;
-  odometry_.yaw = std::remainder(odometry_.yaw + odometry_.yaw_rate * Physics::kStep, 2 * M_PI);
+  odometry_speed_ = (left + right) / 2;
+  odometry_yaw_rate_ = (right - left) / separation_;
+  const double middle_yaw = odometry_yaw_ + odometry_yaw_rate_ * Physics::kStep / 2;
+  odometry_x_ += odometry_speed_ * std::cos(middle_yaw) * Physics::kStep;
+  odometry_y_ += odometry_speed_ * std::sin(middle_yaw) * Physics::kStep;
+  odometry_yaw_ = std::remainder(odometry_yaw_ + odometry_yaw_rate_ * Physics::kStep, 2 * M_PI);
+}
+
+OdometrySample Husky::Odometry() const {
+  OdometrySample sample;
+  sample.pose.setOrigin({btScalar(odometry_x_), btScalar(odometry_y_), 0});
+  sample.pose.setRotation(btQuaternion(btVector3(0, 0, 1), btScalar(odometry_yaw_)));
+  sample.velocity.setX(btScalar(odometry_speed_));
+  sample.angular_velocity.setZ(btScalar(odometry_yaw_rate_));
+  return sample;
 }
 
 }  // namespace tld_follower::sim

@@ -4,8 +4,7 @@
 #include <array>
 #include <string>
 
-#include "sim/physics.h"
-#include "sim/robot.h"
+#include "sim/mobile_robot.h"
 
 namespace tld_follower::sim {
 
@@ -22,49 +21,35 @@ struct HuskyParameters {
 };
 
 /// The ground robot: a chassis and four wheels on hinges with velocity motors, steered by skidding.
-class Husky {
+class Husky : public MobileRobot {
  public:
-  struct Wheel {
-    std::string joint;
-    Body body;
-    double angle = 0;  ///< Forward positive, unwrapped [rad].
-    double speed = 0;  ///< [rad/s]
-  };
-  /// What the wheels alone tell: pose in the frame where it started, and speeds.
-  struct Odometry {
-    double x = 0, y = 0, yaw = 0;
-    double speed = 0, yaw_rate = 0;
-  };
-
-  /// `pose` is where the root link starts. Throws std::runtime_error for an unsuitable robot.
+  /// `pose` is where the root link of `robot`, which must outlive this object, starts. Throws
+  /// std::runtime_error for an unsuitable robot.
   Husky(const HuskyParameters& parameters, const Robot& robot, const btTransform& pose,
         Physics* physics);
 
-  /// Speed forward [m/s] and yaw rate [rad/s], given at `time` [s]. A command that is not finite
-  /// stops the robot and returns false.
-  bool Command(double speed, double yaw_rate, double time);
+  /// Takes the forward velocity and the yaw rate; a command that is not finite stops the robot.
+  bool Command(const std::array<double, 3>& velocity, double yaw_rate, double time) override;
+  void Actuate(double time) override;
+  void Measure() override;
 
-  /// Sets the motors for the physics step that starts at `time` [s].
-  void Actuate(double time);
-
-  /// Reads the wheels after the step and updates the odometry.
-  void Measure();
-
-  const Body& chassis() const { return chassis_; }
-  const std::array<Wheel, 4>& wheels() const { return wheels_; }
-  const Odometry& odometry() const { return odometry_; }
+  /// What the wheels alone tell.
+  OdometrySample Odometry() const override;
+  std::vector<JointSample> Joints() const override { return {wheels_.begin(), wheels_.end()}; }
+  bool flies() const override { return false; }
+  bool ready() const override { return true; }
 
  private:
   HuskyParameters parameters_;
-  Body chassis_;
-  std::array<Wheel, 4> wheels_;
+  std::array<JointSample, 4> wheels_;
   std::array<btHingeConstraint*, 4> motors_{};
   std::array<btVector3, 4> axes_;  // In the frame of the chassis' rigid body.
   double wheel_radius_ = 0;
   double separation_ = 0;  // True distance of left and right wheels times the multiplier [m].
   double command_speed_ = 0, command_yaw_rate_ = 0, command_time_ = 0;
   double speed_ = 0, yaw_rate_ = 0;  // After the ramp.
-  Odometry odometry_;
+  double odometry_x_ = 0, odometry_y_ = 0, odometry_yaw_ = 0;
+  double odometry_speed_ = 0, odometry_yaw_rate_ = 0;
 };
 
 }  // namespace tld_follower::sim

@@ -130,6 +130,12 @@ void ReadHusky(const ros::NodeHandle& handle, HuskyParameters* p) {
   ReadPositive(handle, "husky/max_wheel_torque", &p->max_wheel_torque);
 }
 
+void ReadMast(const ros::NodeHandle& handle, Mast* mast) {
+  ReadFinite(handle, "ugv/camera_forward", &mast->forward);
+  ReadPositive(handle, "ugv/camera_height", &mast->height);
+  ReadFinite(handle, "ugv/camera_pitch", &mast->pitch);
+}
+
 Mode ReadMode(const ros::NodeHandle& handle) {
   std::string mode = "realtime";
   Read(handle, "mode", "realtime, fast or lockstep", &mode);
@@ -153,12 +159,13 @@ NodeParameters ReadParameters(const ros::NodeHandle& handle) {
   simulation.seed = uint64_t(ReadWhole(handle, "seed", 0));
   ReadPositive(handle, "rate", &simulation.frame_rate);
   ReadNotNegative(handle, "image_noise", &simulation.image_noise);
-  ReadPlacement(handle, "spiri_pose", &simulation.spiri_place);
-  ReadPlacement(handle, "husky_pose", &simulation.husky_place);
+  ReadPlacement(handle, "vehicle_pose", &simulation.cast.vehicle_place);
+  ReadPlacement(handle, "target_pose", &simulation.cast.target_place);
   ReadCamera(handle, &simulation.camera);
-  ReadSpiri(handle, &simulation.spiri);
+  ReadSpiri(handle, &simulation.cast.spiri);
   ReadSensors(handle, &simulation.sensors);
-  ReadHusky(handle, &simulation.husky);
+  ReadHusky(handle, &simulation.cast.husky);
+  ReadMast(handle, &simulation.cast.mast);
   return result;
 }
 

@@ -17,13 +17,13 @@ struct NodeParameters {
   SimulationConfig simulation;
   Mode mode = Mode::kRealtime;
   bool paused = false;
-  bool lockstep_target = false;   ///< Lockstep waits for /husky/cmd_vel as well.
+  bool lockstep_target = false;   ///< Lockstep waits for the target's command as well.
   double lockstep_timeout = 5.0;  ///< [s of wall-clock time]
 };
 
-/// Reads what config/simulator.yaml, spiri.yaml and husky.yaml document from the private namespace.
-/// What is not given keeps its default. Throws std::invalid_argument naming the parameter if one
-/// has a wrong type or value.
+/// Reads what config/simulator.yaml, spiri.yaml, husky.yaml and ugv.yaml document from the private
+/// namespace. What is not given keeps its default. Throws std::invalid_argument naming the
+/// parameter if one has a wrong type or value.
 NodeParameters ReadParameters(const ros::NodeHandle& private_handle);
 
 }  // namespace tld_follower::sim

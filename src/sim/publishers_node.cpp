@@ -37,25 +37,32 @@ Publishers::Publishers(ros::NodeHandle handle, ros::NodeHandle private_handle,
       right_image_(handle.advertise<sensor_msgs::Image>("stereo/right/image_raw", 5)),
       left_info_(handle.advertise<sensor_msgs::CameraInfo>("stereo/left/camera_info", 5)),
       right_info_(handle.advertise<sensor_msgs::CameraInfo>("stereo/right/camera_info", 5)),
-      joint_states_(handle.advertise<sensor_msgs::JointState>("husky/joint_states", 50)),
-      husky_odometry_(handle.advertise<nav_msgs::Odometry>("husky/odom", 50)),
       imu_(handle.advertise<sensor_msgs::Imu>("raw_imu", 100)),
-      range_(handle.advertise<sensor_msgs::Range>("range", 10)),
-      odometry_(handle.advertise<nav_msgs::Odometry>("spiri/odometry", 100)),
       ground_truth_(handle.advertise<nav_msgs::Odometry>("ground_truth/state", 100)),
-      husky_ground_truth_(handle.advertise<nav_msgs::Odometry>("husky/ground_truth/state", 100)),
       tf_(handle.advertise<tf2_msgs::TFMessage>("/tf", 100)),
       tf_static_(handle.advertise<tf2_msgs::TFMessage>("/tf_static", 1, true)),
       truth_(private_handle.advertise<tld_follower::Truth>("truth", 10)),
+      target_odometry_frame_(simulation.cast().target().name + "_odom"),
+      target_frame_(simulation.cast().target().name + "_base_link"),
       left_camera_(ToCameraInfo(simulation.camera(), Eye::kLeft, kOpticalFrame)),
-      right_camera_(ToCameraInfo(simulation.camera(), Eye::kRight, kOpticalFrame)) {}
+      right_camera_(ToCameraInfo(simulation.camera(), Eye::kRight, kOpticalFrame)) {
+  const std::string& vehicle = simulation.cast().vehicle().name;
+  const std::string& target = simulation.cast().target().name;
+  odometry_ = handle.advertise<nav_msgs::Odometry>(vehicle + "/odometry", 100);
+  target_odometry_ = handle.advertise<nav_msgs::Odometry>(target + "/odom", 50);
+  target_ground_truth_ = handle.advertise<nav_msgs::Odometry>(target + "/ground_truth/state", 100);
+  if (simulation.vehicle().flies()) range_ = handle.advertise<sensor_msgs::Range>("range", 10);
+  if (!simulation.target().flies()) {
+    joint_states_ = handle.advertise<sensor_msgs::JointState>(target + "/joint_states", 50);
+  }
+}
 
 void Publishers::PublishStart(const Simulation& simulation, const ros::Time& stamp) {
   const StereoCamera& camera = simulation.camera();
   tf2_msgs::TFMessage message;
   message.transforms = {
-      ToTransform(simulation.spiri().body().Pose(), stamp, "world", "odom"),
-      ToTransform(simulation.husky().chassis().Pose(), stamp, "world", "husky_odom"),
+      ToTransform(simulation.vehicle().body().Pose(), stamp, "world", "odom"),
+      ToTransform(simulation.target().body().Pose(), stamp, "world", target_odometry_frame_),
       ToTransform(camera.Mount(), stamp, "base_link", "stereo_link"),
       ToTransform(camera.Optical(Eye::kLeft), stamp, "stereo_link", kOpticalFrame)};
   tf_static_.publish(message);
@@ -110,49 +117,40 @@ void Publishers::PublishTick(const Simulation& simulation, const ros::Time& stam
   tf.transforms = {ToTransform(sample.pose, stamp, "odom", "base_link")};
   tf_.publish(tf);
 
-  ground_truth_.publish(ToGroundTruth(simulation.spiri().body(), stamp, "base_link"));
-  husky_ground_truth_.publish(
-      ToGroundTruth(simulation.husky().chassis(), stamp, "husky_base_link"));
+  ground_truth_.publish(ToGroundTruth(simulation.vehicle().body(), stamp, "base_link"));
+  target_ground_truth_.publish(ToGroundTruth(simulation.target().body(), stamp, target_frame_));
 }
 
 void Publishers::PublishSlowTick(const Simulation& simulation, const ros::Time& stamp) {
-  sensor_msgs::JointState joints;
-  joints.header.stamp = stamp;
-  for (const Husky::Wheel& wheel : simulation.husky().wheels()) {
-    joints.name.push_back(wheel.joint);
-    joints.position.push_back(wheel.angle);
-    joints.velocity.push_back(wheel.speed);
+  const MobileRobot& target = simulation.target();
+  if (joint_states_) {
+    sensor_msgs::JointState joints;
+    joints.header.stamp = stamp;
+    for (const JointSample& joint : target.Joints()) {
+      joints.name.push_back(joint.name);
+      joints.position.push_back(joint.angle);
+      joints.velocity.push_back(joint.speed);
+    }
+    joint_states_.publish(joints);
   }
-  joint_states_.publish(joints);
 
-  const Husky::Odometry& wheels = simulation.husky().odometry();
-  const btTransform pose(btQuaternion(btVector3(0, 0, 1), btScalar(wheels.yaw)),
-                         btVector3(btScalar(wheels.x), btScalar(wheels.y), 0));
+  const OdometrySample sample = target.Odometry();
   nav_msgs::Odometry odometry;
   odometry.header.stamp = stamp;
-  odometry.header.frame_id = "husky_odom";
-  odometry.child_frame_id = "husky_base_link";
-  odometry.pose.pose = ToPose(pose);
-  odometry.twist.twist.linear.x = wheels.speed;
-  odometry.twist.twist.angular.z = wheels.yaw_rate;
-  husky_odometry_.publish(odometry);
+  odometry.header.frame_id = target_odometry_frame_;
+  odometry.child_frame_id = target_frame_;
+  odometry.pose.pose = ToPose(sample.pose);
+  odometry.twist.twist = ToTwist(sample.velocity, sample.angular_velocity);
+  target_odometry_.publish(odometry);
 
   tf2_msgs::TFMessage tf;
-  tf.transforms = {ToTransform(pose, stamp, "husky_odom", "husky_base_link")};
+  tf.transforms = {ToTransform(sample.pose, stamp, target_odometry_frame_, target_frame_)};
   tf_.publish(tf);
 }
 
 void Publishers::PublishFrame(Simulation* simulation, const ros::Time& stamp) {
   TakeTime(stamp);
-  sensor_msgs::Range range;
-  range.header.stamp = stamp;
-  range.header.frame_id = "base_link";
-  range.radiation_type = sensor_msgs::Range::INFRARED;
-  range.min_range = 0.02f;
-  range.max_range = float(simulation->sensors().parameters().range_max);
-  range.range = float(simulation->ReadRange());
-  range_.publish(range);
-
+  if (range_) PublishRange(simulation, stamp);
   const bool truth = truth_.getNumSubscribers() > 0;
   TargetMask mask;
   simulation->Render(&images_, truth ? &mask : nullptr);
@@ -164,11 +162,22 @@ void Publishers::PublishFrame(Simulation* simulation, const ros::Time& stamp) {
   right_image_.publish(ToImage(right_camera_, images_.right));
 }
 
+void Publishers::PublishRange(Simulation* simulation, const ros::Time& stamp) {
+  sensor_msgs::Range range;
+  range.header.stamp = stamp;
+  range.header.frame_id = "base_link";
+  range.radiation_type = sensor_msgs::Range::INFRARED;
+  range.min_range = 0.02f;
+  range.max_range = float(simulation->sensors().parameters().range_max);
+  range.range = float(simulation->ReadRange());
+  range_.publish(range);
+}
+
 void Publishers::PublishTruth(const Simulation& simulation, const TargetMask& mask,
                               const ros::Time& stamp) {
   const Truth truth = simulation.Measure();
-  const Body& drone = simulation.spiri().body();
-  const Body& target = simulation.husky().chassis();
+  const Body& drone = simulation.vehicle().body();
+  const Body& target = simulation.target().body();
   tld_follower::Truth message;
   message.header.stamp = stamp;
   message.header.frame_id = "world";

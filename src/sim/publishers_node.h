@@ -6,6 +6,7 @@
 #include <sensor_msgs/Image.h>
 
 #include <deque>
+#include <string>
 #include <utility>
 
 #include "sim/simulation.h"
@@ -34,12 +35,14 @@ class Publishers {
   void PublishTick(const Simulation& simulation, const ros::Time& stamp);
   void PublishSlowTick(const Simulation& simulation, const ros::Time& stamp);
   void PublishFrame(Simulation* simulation, const ros::Time& stamp);
+  void PublishRange(Simulation* simulation, const ros::Time& stamp);
   void PublishTruth(const Simulation& simulation, const TargetMask& mask, const ros::Time& stamp);
   void TakeTime(const ros::Time& stamp);
 
   ros::Publisher clock_, left_image_, right_image_, left_info_, right_info_, joint_states_;
-  ros::Publisher husky_odometry_, imu_, range_, odometry_, ground_truth_, husky_ground_truth_;
+  ros::Publisher target_odometry_, imu_, range_, odometry_, ground_truth_, target_ground_truth_;
   ros::Publisher tf_, tf_static_, truth_;
+  const std::string target_odometry_frame_, target_frame_;
   sensor_msgs::CameraInfo left_camera_, right_camera_;
   StereoImages images_;
   std::deque<std::pair<double, double>> stopwatch_;  // Wall-clock and simulated time of frames [s].

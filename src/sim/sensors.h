@@ -3,12 +3,12 @@
 
 #include <array>
 
+#include "sim/mobile_robot.h"
 #include "sim/noise.h"
-#include "sim/physics.h"
 
 namespace tld_follower::sim {
 
-/// Errors of the drone's sensors as standard deviations; config/spiri.yaml gives their sources.
+/// Errors of the vehicle's sensors as standard deviations; config/spiri.yaml gives their sources.
 struct SensorParameters {
   double acceleration_noise = 0.35;  ///< White, each axis [m/s^2].
   double gyroscope_noise = 0.05;     ///< White, each axis [rad/s].
@@ -30,16 +30,8 @@ struct ImuSample {
   btQuaternion attitude = btQuaternion::getIdentity();
 };
 
-/// What the drone knows of its own motion. Pose in the frame in which it started; twist in the
-/// body's axes.
-struct OdometrySample {
-  btTransform pose = btTransform::getIdentity();
-  btVector3 velocity{0, 0, 0};          ///< [m/s]
-  btVector3 angular_velocity{0, 0, 0};  ///< [rad/s]
-};
-
-/// Inertial unit, range finder and odometry (optical flow, range and gyroscope fused) of the drone,
-/// with noise and drift. Velocity errors are integrated into the odometry's place.
+/// Inertial unit, range finder and odometry (optical flow, range and gyroscope fused) of the
+/// vehicle, with noise and drift. Velocity errors are integrated into the odometry's place.
 class Sensors {
  public:
   Sensors(const SensorParameters& parameters, uint64_t seed, const Body& body,

@@ -29,11 +29,9 @@ SimNode::SimNode()
       simulation_(parameters_.simulation, Warn),
       publishers_(handle_, private_handle_, simulation_),
       paused_(parameters_.paused) {
-  handle_.setCallbackQueue(&commands_);
-  const auto no_delay = ros::TransportHints().tcpNoDelay();
-  command_ = handle_.subscribe("cmd_vel", 10, &SimNode::OnCommand, this, no_delay);
-  target_command_ =
-      handle_.subscribe("husky/cmd_vel", 10, &SimNode::OnTargetCommand, this, no_delay);
+  handle_.setCallbackQueue(&command_queue_);
+  Subscribe("cmd_vel", &Simulation::vehicle, &vehicle_commands_);
+  Subscribe(simulation_.cast().target().name + "/cmd_vel", &Simulation::target, &target_commands_);
   pause_ = private_handle_.advertiseService("pause_physics", &SimNode::OnPause, this);
   unpause_ = private_handle_.advertiseService("unpause_physics", &SimNode::OnUnpause, this);
   reset_world_ = private_handle_.advertiseService("reset_world", &SimNode::OnResetWorld, this);
@@ -51,15 +49,15 @@ void SimNode::Run() {
   ros::CallbackQueue& services = *ros::getGlobalCallbackQueue();
   while (ros::ok()) {
     services.callAvailable(paused_ ? kIdle : ros::WallDuration(0));
-    commands_.callAvailable();
+    command_queue_.callAvailable();
     if (paused_) continue;
     if (WaitsForCommands()) {
-      commands_.callAvailable(kPoll);
+      command_queue_.callAvailable(kPoll);
       continue;
     }
     const double ahead = SecondsAhead();
     if (ahead > 0) {
-      commands_.callAvailable(ros::WallDuration(std::min(ahead, kIdle.toSec())));
+      command_queue_.callAvailable(ros::WallDuration(std::min(ahead, kIdle.toSec())));
       continue;
     }
     Advance();
@@ -77,23 +75,29 @@ void SimNode::Advance() {
   publishers_.Publish(&simulation_, moment, Stamp());
   if (moment.frame && parameters_.mode == Mode::kLockstep) {
     waiting_ = true;
-    commanded_ = target_commanded_ = false;
+    vehicle_commands_.came = target_commands_.came = false;
     frame_published_ = ros::WallTime::now();
   }
 }
 
-// The answer to a frame is one command for the drone and, if so asked, one for the target.
+// The answer to a frame is one command for the vehicle and, if so asked, one for the target.
 bool SimNode::WaitsForCommands() {
   if (!waiting_) return false;
-  if (commanded_ && (target_commanded_ || !parameters_.lockstep_target)) {
+  const Commands* missing = nullptr;
+  if (parameters_.lockstep_target && !target_commands_.came) missing = &target_commands_;
+  if (!vehicle_commands_.came) missing = &vehicle_commands_;
+  if (missing == nullptr) {
     waiting_ = false;
   } else if ((ros::WallTime::now() - frame_published_).toSec() > parameters_.lockstep_timeout) {
     waiting_ = false;
     ROS_WARN(
-        "lockstep: no %s answered frame %lu within %.1f s; going on without. If it comes late, "
+        "lockstep: no %s answered frame %lu within %.1f s (%s); going on without. If it comes "
+        "late, "
         "it answers a later frame: this run is no longer reproducible",
-        commanded_ ? "/husky/cmd_vel" : "/cmd_vel", static_cast<unsigned long>(simulation_.frame()),
-        parameters_.lockstep_timeout);
+        missing->subscriber.getTopic().c_str(), static_cast<unsigned long>(simulation_.frame()),
+        parameters_.lockstep_timeout,
+        missing->subscriber.getNumPublishers() == 0 ? "nobody publishes it"
+                                                    : "who publishes it is silent");
   }
   return waiting_;
 }
@@ -120,19 +124,23 @@ void SimNode::RestartTime() {
   publishers_.RestartStopwatch();
 }
 
-void SimNode::OnCommand(const geometry_msgs::Twist& twist) {
-  commanded_ = true;
-  const bool finite = simulation_.spiri().Command({twist.linear.x, twist.linear.y, twist.linear.z},
-                                                  twist.angular.z, simulation_.time());
-  if (!finite && IsDue(&command_warning_)) ROS_WARN("/cmd_vel is not finite; hovering");
+void SimNode::Subscribe(const std::string& topic, MobileRobot& (Simulation::*robot)(),
+                        Commands* commands) {
+  commands->subscriber = handle_.subscribe<geometry_msgs::Twist>(
+      topic, 10,
+      [this, robot, commands](const geometry_msgs::TwistConstPtr& twist) {
+        OnCommand(*twist, &(simulation_.*robot)(), commands);
+      },
+      ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
 }
 
-void SimNode::OnTargetCommand(const geometry_msgs::Twist& twist) {
-  target_commanded_ = true;
-  const bool finite =
-      simulation_.husky().Command(twist.linear.x, twist.angular.z, simulation_.time());
-  if (!finite && IsDue(&target_command_warning_)) {
-    ROS_WARN("/husky/cmd_vel is not finite; stopping");
+void SimNode::OnCommand(const geometry_msgs::Twist& twist, MobileRobot* robot, Commands* commands) {
+  commands->came = true;
+  const bool finite = robot->Command({twist.linear.x, twist.linear.y, twist.linear.z},
+                                     twist.angular.z, simulation_.time());
+  if (!finite && IsDue(&commands->warning)) {
+    ROS_WARN("%s is not finite; %s", commands->subscriber.getTopic().c_str(),
+             robot->flies() ? "hovering" : "stopping");
   }
 }
 
@@ -175,7 +183,7 @@ bool SimNode::OnStep(tld_follower::Step::Request& request, tld_follower::Step::R
   RestartTime();
   const uint64_t last = simulation_.frame() + request.frames;
   while (ros::ok() && simulation_.frame() < last) {
-    commands_.callAvailable(waiting_ ? kPoll : ros::WallDuration(0));
+    command_queue_.callAvailable(waiting_ ? kPoll : ros::WallDuration(0));
     if (!WaitsForCommands()) Advance();
   }
   response.success = simulation_.frame() == last;

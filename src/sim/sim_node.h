@@ -28,8 +28,15 @@ class SimNode {
  private:
   using Empty = std_srvs::Empty;
 
-  void OnCommand(const geometry_msgs::Twist& twist);
-  void OnTargetCommand(const geometry_msgs::Twist& twist);
+  /// A robot's commands.
+  struct Commands {
+    ros::Subscriber subscriber;
+    bool came = false;      // Since the last frame.
+    ros::WallTime warning;  // When one was last refused with a warning.
+  };
+
+  void Subscribe(const std::string& topic, MobileRobot& (Simulation::*robot)(), Commands* commands);
+  void OnCommand(const geometry_msgs::Twist& twist, MobileRobot* robot, Commands* commands);
   bool OnPause(Empty::Request&, Empty::Response&);
   bool OnUnpause(Empty::Request&, Empty::Response&);
   bool OnResetWorld(Empty::Request&, Empty::Response&);
@@ -45,23 +52,21 @@ class SimNode {
 
   ros::NodeHandle handle_, private_handle_;
   // Commands have their own queue, so that the step service can receive them while it runs.
-  ros::CallbackQueue commands_;
+  ros::CallbackQueue command_queue_;
   NodeParameters parameters_;
   Simulation simulation_;
   Publishers publishers_;
-  ros::Subscriber command_, target_command_;
+  Commands vehicle_commands_, target_commands_;
   ros::ServiceServer pause_, unpause_, reset_world_, reset_simulation_, step_;
 
   bool paused_;
   int64_t start_ns_ = 0;  // ROS time of the simulation's start.
-  // Lockstep: what has come since the last frame.
-  bool waiting_ = false, commanded_ = false, target_commanded_ = false;
+  bool waiting_ = false;  // Lockstep: the last frame is not answered yet.
   ros::WallTime frame_published_;
   // Realtime: a moment of the simulation and the wall-clock time at which it is due.
   double anchor_time_ = 0;
   ros::WallTime anchor_wall_;
-  // When each warning was given last.
-  ros::WallTime slip_warning_, command_warning_, target_command_warning_;
+  ros::WallTime slip_warning_;
 };
 
 }  // namespace tld_follower::sim

@@ -3,43 +3,35 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "sim/husky.h"
+#include "sim/cast.h"
 #include "sim/image_noise.h"
 #include "sim/physics.h"
 #include "sim/renderer.h"
 #include "sim/sensors.h"
-#include "sim/spiri.h"
 #include "sim/world.h"
 
 namespace tld_follower::sim {
-
-/// A place on the ground that replaces the world's [m, rad].
-struct Placement {
-  double x = 0, y = 0, yaw = 0;
-};
 
 struct SimulationConfig {
   std::string world_file;
   uint64_t seed = 0;
   double frame_rate = 30;    ///< Stereo pairs a second of simulated time [Hz].
   double image_noise = 1.0;  ///< Standard deviation [grey levels].
-  StereoCamera camera;
-  SpiriParameters spiri;
+  StereoCamera camera;       ///< A ground vehicle carries it on its mast instead.
+  CastConfig cast;
   SensorParameters sensors;
-  HuskyParameters husky;
-  std::optional<Placement> spiri_place;
-  std::optional<Placement> husky_place;
 };
 
 /// What only a simulator knows. World frame, SI units.
 struct Truth {
-  double distance = 0;      ///< Left camera's centre to the nearest point of the target.
-  double clearance = 0;     ///< Drone's collision shape to the nearest point of anything else.
-  uint32_t collisions = 0;  ///< Contact episodes of the drone since its take-off was complete.
+  double distance = 0;  ///< Left camera's centre to the nearest point of the target.
+  /// Vehicle's collision shape to the nearest point of anything else; but ground for one that
+  /// rolls.
+  double clearance = 0;
+  uint32_t collisions = 0;  ///< Contact episodes of the vehicle since it was ready; likewise.
 };
 
 /// What happened at the moment to which the simulation advanced.
@@ -49,7 +41,7 @@ struct Moment {
   bool frame = false;      ///< A stereo pair is due.
 };
 
-/// The whole simulation: world, drone, target and cameras. Knows no ROS and no wall clock.
+/// The whole simulation: world, vehicle, target and cameras. Knows no ROS and no wall clock.
 ///
 /// Frame k = 1, 2, ... falls on the physics step nearest to k / frame_rate. The same configuration
 /// and the same commands at the same times give bit-identical states and images, in a fresh object
@@ -76,28 +68,30 @@ class Simulation {
   /// Computes the truth of this moment.
   Truth Measure() const;
 
-  Spiri& spiri();
-  Husky& husky();
-  const Spiri& spiri() const;
-  const Husky& husky() const;
+  /// Valid until the next reset.
+  MobileRobot& vehicle();
+  MobileRobot& target();
+  const MobileRobot& vehicle() const;
+  const MobileRobot& target() const;
+  const Cast& cast() const { return cast_; }
   const Sensors& sensors() const;
   /// Reads the range finder [m]; infinity if nothing is in range.
   double ReadRange();
-  const StereoCamera& camera() const { return config_.camera; }
+  const StereoCamera& camera() const { return camera_; }
   int triangles() const { return renderer_->triangles(); }
 
  private:
   struct State;
 
-  btTransform RobotPose(const std::string& name, const std::optional<Placement>& place) const;
   Scene MakeScene() const;
   int64_t FrameStep(uint64_t frame) const;
   void CountContacts();
 
   const SimulationConfig config_;
   const Resources resources_;
-  World world_;
-  Robot spiri_robot_, husky_robot_;
+  const World world_;
+  const Cast cast_;
+  const StereoCamera camera_;
   ImageNoise image_noise_;
   std::unique_ptr<State> state_;
   std::unique_ptr<Renderer> renderer_;

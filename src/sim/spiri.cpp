@@ -40,13 +40,13 @@ double Heading(const btMatrix3x3& attitude) { return std::atan2(attitude[1][0], 
 
 Spiri::Spiri(const SpiriParameters& parameters, const Robot& robot, const btTransform& pose,
              Physics* physics)
-    : parameters_(parameters) {
+    : parameters_(parameters), start_(pose) {
   std::vector<const RobotLink*> rigid;
   for (const RobotLink& link : robot.links) rigid.push_back(&link);
-  body_ = physics->AddBody(rigid, pose);
-  mass_ = 1.0 / body_.rigid->getInvMass();
-  inertia_ = body_.rigid->getLocalInertia();
-  gravity_ = body_.rigid->getGravity().length();
+  parts_.push_back({physics->AddBody(rigid, pose), rigid});
+  mass_ = 1.0 / body().rigid->getInvMass();
+  inertia_ = body().rigid->getLocalInertia();
+  gravity_ = body().rigid->getGravity().length();
   altitude_ = pose.getOrigin().z();
   heading_ = Heading(pose.getBasis());
   hold_ = pose.getOrigin();
@@ -55,6 +55,10 @@ Spiri::Spiri(const SpiriParameters& parameters, const Robot& robot, const btTran
   if (!(max_thrust > mass_ * gravity_)) {
     throw std::runtime_error("spiri's rotors cannot lift it: " + std::to_string(max_thrust) +
                              " N at full speed, weight " + std::to_string(mass_ * gravity_) + " N");
+  }
+  if (altitude_ > parameters.take_off_altitude - kTakenOff) {  // It starts in the air.
+    flying_ = true;
+    rotor_speeds_.fill(std::sqrt(mass_ * gravity_ / 4 / parameters.motor_constant));
   }
 }
 
@@ -75,9 +79,9 @@ bool Spiri::Command(const std::array<double, 3>& velocity, double yaw_rate, doub
 
 btVector3 Spiri::WantedVelocity(double time) {
   if (command_ && time - command_->time > parameters_.command_timeout) command_.reset();
-  const btTransform pose = body_.Pose();
+  const btTransform pose = body().Pose();
   const btVector3& place = pose.getOrigin();
-  const btVector3 speed = body_.Velocity();
+  const btVector3 speed = body().Velocity();
   const double target = parameters_.take_off_altitude;
 
   btVector3 wanted(0, 0, 0);
@@ -107,7 +111,7 @@ btVector3 Spiri::WantedVelocity(double time) {
 }
 
 btVector3 Spiri::WantedForce(const btVector3& wanted_velocity) {
-  const btVector3 error = wanted_velocity - body_.Velocity();
+  const btVector3 error = wanted_velocity - body().Velocity();
   const btVector3 p(btScalar(parameters_.velocity_xy_p), btScalar(parameters_.velocity_xy_p),
                     btScalar(parameters_.velocity_z_p));
   const btVector3 i(btScalar(parameters_.velocity_xy_i), btScalar(parameters_.velocity_xy_i),
@@ -130,8 +134,8 @@ btVector3 Spiri::WantedForce(const btVector3& wanted_velocity) {
 }
 
 btVector3 Spiri::WantedTorque(const btVector3& wanted_force, double wanted_yaw_rate) const {
-  const btMatrix3x3& attitude = body_.rigid->getWorldTransform().getBasis();
-  const btVector3 rates = attitude.transpose() * body_.AngularVelocity();
+  const btMatrix3x3& attitude = body().rigid->getWorldTransform().getBasis();
+  const btVector3 rates = attitude.transpose() * body().AngularVelocity();
   // The shortest turn from the rotors' axis to the wanted force, in body axes; it has no z part.
   const btVector3 wanted_up = attitude.transpose() * wanted_force.normalized();
   const btVector3 axis = btVector3(0, 0, 1).cross(wanted_up);
@@ -170,22 +174,28 @@ void Spiri::ApplyForces() {
         btVector3(btScalar(kAlongY[r] * lever * thrust), btScalar(-kAlongX[r] * lever * thrust),
                   btScalar(kSpin[r] * parameters_.moment_constant * thrust));
   }
-  const btMatrix3x3& attitude = body_.rigid->getWorldTransform().getBasis();
-  const btVector3 air = attitude.transpose() * body_.Velocity();
-  const btVector3 rates = attitude.transpose() * body_.AngularVelocity();
+  const btMatrix3x3& attitude = body().rigid->getWorldTransform().getBasis();
+  const btVector3 air = attitude.transpose() * body().Velocity();
+  const btVector3 rates = attitude.transpose() * body().AngularVelocity();
   const btVector3 drag(btScalar(parameters_.drag_xy), btScalar(parameters_.drag_xy),
                        btScalar(parameters_.drag_z));
   const btVector3 turn_drag(btScalar(parameters_.drag_roll_pitch),
                             btScalar(parameters_.drag_roll_pitch), btScalar(parameters_.drag_yaw));
   force -= air.length() * drag * air;
   torque -= rates.length() * turn_drag * rates;
-  body_.rigid->applyCentralForce(attitude * force);
-  body_.rigid->applyTorque(attitude * torque);
+  body().rigid->applyCentralForce(attitude * force);
+  body().rigid->applyTorque(attitude * torque);
+}
+
+OdometrySample Spiri::Odometry() const {
+  const btTransform pose = body().Pose();
+  const btMatrix3x3 to_body = pose.getBasis().transpose();
+  return {start_.inverse() * pose, to_body * body().Velocity(), to_body * body().AngularVelocity()};
 }
 
 void Spiri::Actuate(double time) {
   const btVector3 wanted_velocity = WantedVelocity(time);
-  const double heading = Heading(body_.Pose().getBasis());
+  const double heading = Heading(body().Pose().getBasis());
   const double heading_error =
       std::clamp(Wrap(heading_ - heading), -kMaxHeadingError, kMaxHeadingError);
   heading_ = heading + heading_error;
@@ -193,7 +203,7 @@ void Spiri::Actuate(double time) {
       (flying_ && command_ ? command_->yaw_rate : 0.0) + parameters_.heading_p * heading_error;
 
   const btVector3 force = WantedForce(wanted_velocity);
-  const btVector3 up = body_.rigid->getWorldTransform().getBasis().getColumn(2);
+  const btVector3 up = body().rigid->getWorldTransform().getBasis().getColumn(2);
   DriveRotors(std::max<double>(0, force.dot(up)), WantedTorque(force, yaw_rate));
   ApplyForces();
 }

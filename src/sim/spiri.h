@@ -4,8 +4,7 @@
 #include <array>
 #include <optional>
 
-#include "sim/physics.h"
-#include "sim/robot.h"
+#include "sim/mobile_robot.h"
 
 namespace tld_follower::sim {
 
@@ -44,26 +43,26 @@ struct SpiriParameters {
 /// into attitude and thrust.
 ///
 /// The cascade has hector_quadrotor's form: velocity PI in the yaw frame -> acceleration -> tilt
-/// (limited) and thrust -> attitude PD -> rotors. It takes off by itself, then obeys commands and
-/// holds its place when there are none. Its own state feeds it, as in the thesis' simulator.
-class Spiri {
+/// (limited) and thrust -> attitude PD -> rotors. It takes off by itself unless it starts that
+/// high, then obeys commands and holds its place when there are none. Its own state feeds it, as in
+/// the thesis' simulator.
+class Spiri : public MobileRobot {
  public:
-  /// `pose` is where the root link starts. Throws std::runtime_error for an unsuitable robot or
-  /// parameters.
+  /// `pose` is where the root link of `robot`, which must outlive this object, starts. Throws
+  /// std::runtime_error for an unsuitable robot or parameters.
   Spiri(const SpiriParameters& parameters, const Robot& robot, const btTransform& pose,
         Physics* physics);
 
-  /// A velocity in the drone's yaw frame (x forward, y left, z up) [m/s] and a yaw rate [rad/s],
-  /// given at `time` [s]; obeyed after take-off. A command that is not finite makes the drone hover
-  /// and returns false.
-  bool Command(const std::array<double, 3>& velocity, double yaw_rate, double time);
+  /// Obeyed after take-off. A command that is not finite makes the drone hover.
+  bool Command(const std::array<double, 3>& velocity, double yaw_rate, double time) override;
+  void Actuate(double time) override;
+  void Measure() override {}
 
-  /// Sets the forces for the physics step that starts at `time` [s].
-  void Actuate(double time);
-
+  /// The state that its controller flies by: without error.
+  OdometrySample Odometry() const override;
+  bool flies() const override { return true; }
   /// Take-off is complete.
-  bool flying() const { return flying_; }
-  const Body& body() const { return body_; }
+  bool ready() const override { return flying_; }
   const std::array<double, 4>& rotor_speeds() const { return rotor_speeds_; }
 
  private:
@@ -80,7 +79,7 @@ class Spiri {
   void ApplyForces();
 
   SpiriParameters parameters_;
-  Body body_;
+  btTransform start_;
   double mass_;
   btVector3 inertia_;
   double gravity_;

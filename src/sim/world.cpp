@@ -215,12 +215,22 @@ btTransform Model::PoseAt(double time) const {
   return script.back().pose;
 }
 
-const RobotPlacement& World::Robot(const std::string& robot) const {
-  for (const RobotPlacement& placement : robots) {
-    if (placement.name == robot) return placement;
+const RobotPlacement& World::Robot(const std::vector<std::string>& names) const {
+  const RobotPlacement* found = nullptr;
+  std::string listed;
+  for (const std::string& wanted : names) {
+    listed += (listed.empty() ? "'" : " or '") + wanted + "'";
+    for (const RobotPlacement& placement : robots) {
+      if (placement.name != wanted) continue;
+      if (found != nullptr) {
+        throw std::runtime_error("the world '" + file + "' places both '" + found->name +
+                                 "' and '" + wanted + "'; it must be one of them");
+      }
+      found = &placement;
+    }
   }
-  throw std::runtime_error("the world '" + file + "' does not <include> a robot named '" + robot +
-                           "'");
+  if (found != nullptr) return *found;
+  throw std::runtime_error("the world '" + file + "' does not <include> a robot named " + listed);
 }
 
 World LoadWorld(const std::string& file, const Resources& resources, const WarningSink& warn) {

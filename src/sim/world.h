@@ -48,8 +48,9 @@ struct World {
   std::vector<Model> models;
   std::vector<RobotPlacement> robots;
 
-  /// The robot called `name`. Throws std::runtime_error if the world does not place it.
-  const RobotPlacement& Robot(const std::string& name) const;
+  /// The one robot that has one of these names. Throws std::runtime_error if the world places none
+  /// of them or more than one.
+  const RobotPlacement& Robot(const std::vector<std::string>& names) const;
 };
 
 /// Reads an SDF 1.6 world with libsdformat.

@@ -123,7 +123,7 @@ class WiderViewTest(unittest.TestCase):
         random = np.random.default_rng(self.seed)
         speed, rest = random.uniform(0.3, 0.8), random.uniform(0.5, 2.0)
         # Out until the whole target has left the left image, and somewhat more.
-        distance = rospy.get_param("/gazebo/husky_pose")[0] - CAMERA[0]
+        distance = rospy.get_param("/gazebo/target_pose")[0] - CAMERA[0]
         drive_s = (distance * 0.66 + 0.75 + random.uniform(0.0, 0.3)) / speed
         start = BOXED + 1.0
         turn = start + drive_s + rest

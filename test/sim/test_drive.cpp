@@ -14,18 +14,19 @@ class Drive : public testing::Test {
  protected:
   static SimulationConfig Config() {
     SimulationConfig config = FlightConfig();
-    config.spiri_place = Placement{-10, 10, 0};
+    config.cast.vehicle_place = Placement{-10, 10, 0};
     return config;
   }
 
-  btTransform Pose() const { return simulation_.husky().chassis().Pose(); }
+  btTransform Pose() const { return simulation_.target().body().Pose(); }
   double Speed() const {
-    return simulation_.husky().chassis().Velocity().dot(Pose().getBasis().getColumn(0));
+    return simulation_.target().body().Velocity().dot(Pose().getBasis().getColumn(0));
   }
-  double YawRate() const { return simulation_.husky().chassis().AngularVelocity().z(); }
+  double YawRate() const { return simulation_.target().body().AngularVelocity().z(); }
   void DriveUntil(double time, double speed, double yaw_rate) {
-    RunUntil(time, &simulation_,
-             [&] { simulation_.husky().Command(speed, yaw_rate, simulation_.time()); });
+    RunUntil(time, &simulation_, [&] {
+      simulation_.target().Command({speed, 0, 0}, yaw_rate, simulation_.time());
+    });
   }
 
   Simulation simulation_{Config(), ThrowWarning};
@@ -42,7 +43,7 @@ TEST_F(Drive, TwelveSecondsStraightAtOneMetrePerSecond) {
   double slowest = 2, fastest = 0;
   const double start = Pose().getOrigin().x();
   RunUntil(12, &simulation_, [&] {
-    simulation_.husky().Command(1, 0, simulation_.time());
+    simulation_.target().Command({1, 0, 0}, 0, simulation_.time());
     slowest = std::min(slowest, Speed());
     fastest = std::max(fastest, Speed());
   });
@@ -69,31 +70,34 @@ TEST_F(Drive, TurnsAtTheCommandedRateAlthoughItSkids) {
   double rate = 0;
   int count = 0;
   RunUntil(8, &simulation_, [&] {
-    simulation_.husky().Command(0, 1, simulation_.time());
+    simulation_.target().Command({0, 0, 0}, 1, simulation_.time());
     rate += YawRate();
     ++count;
   });
   EXPECT_NEAR(rate / count, 1.0, 0.06);
   // Without the multiplier it would turn 1.875 times too slowly: wheels do 1.875 times the path.
   const double rim =
-      0.1651 * (simulation_.husky().wheels()[1].speed - simulation_.husky().wheels()[0].speed) / 2;
+      0.1651 * (simulation_.target().Joints()[1].speed - simulation_.target().Joints()[0].speed) /
+      2;
   EXPECT_NEAR(rim, 1.875 * 0.5708 / 2, 0.03);
 }
 
 TEST_F(Drive, WheelOdometryFollowsAnArc) {
   DriveUntil(6, 0.8, 0.4);
-  const Husky::Odometry& wheels = simulation_.husky().odometry();
-  EXPECT_NEAR(wheels.speed, 0.8, 0.01);
-  EXPECT_NEAR(wheels.yaw_rate, 0.4, 0.01);
-  EXPECT_NEAR(wheels.x, Pose().getOrigin().x(), 0.25);
-  EXPECT_NEAR(wheels.y, Pose().getOrigin().y(), 0.25);
-  EXPECT_NEAR(std::remainder(wheels.yaw - Heading(Pose().getBasis()), 2 * M_PI), 0, 0.15);
-  EXPECT_GT(simulation_.husky().wheels()[0].angle, 2 * M_PI) << "wheel angles are not wrapped";
+  const OdometrySample wheels = simulation_.target().Odometry();
+  EXPECT_NEAR(wheels.velocity.x(), 0.8, 0.01);
+  EXPECT_NEAR(wheels.angular_velocity.z(), 0.4, 0.01);
+  EXPECT_NEAR(wheels.pose.getOrigin().x(), Pose().getOrigin().x(), 0.25);
+  EXPECT_NEAR(wheels.pose.getOrigin().y(), Pose().getOrigin().y(), 0.25);
+  EXPECT_NEAR(
+      std::remainder(Heading(wheels.pose.getBasis()) - Heading(Pose().getBasis()), 2 * M_PI), 0,
+      0.15);
+  EXPECT_GT(simulation_.target().Joints()[0].angle, 2 * M_PI) << "wheel angles are not wrapped";
 }
 
 TEST_F(Drive, StopsOnACommandThatIsNotFinite) {
   DriveUntil(3, 1, 0);
-  EXPECT_FALSE(simulation_.husky().Command(std::nan(""), 0, simulation_.time()));
+  EXPECT_FALSE(simulation_.target().Command({std::nan(""), 0, 0}, 0, simulation_.time()));
   RunUntil(4, &simulation_);
   EXPECT_NEAR(Speed(), 0, 0.02);
 }

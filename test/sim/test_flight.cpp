@@ -15,16 +15,16 @@ class Flight : public testing::Test {
  protected:
   static SimulationConfig Config() {
     SimulationConfig config = FlightConfig();
-    config.husky_place = Placement{0, 20, 0};
-    config.spiri_place = Placement{0, 0, 0.5};
+    config.cast.target_place = Placement{0, 20, 0};
+    config.cast.vehicle_place = Placement{0, 0, 0.5};
     return config;
   }
 
-  btVector3 Place() const { return simulation_.spiri().body().Pose().getOrigin(); }
-  btVector3 Velocity() const { return simulation_.spiri().body().Velocity(); }
-  double Yaw() const { return Heading(simulation_.spiri().body().Pose().getBasis()); }
+  btVector3 Place() const { return simulation_.vehicle().body().Pose().getOrigin(); }
+  btVector3 Velocity() const { return simulation_.vehicle().body().Velocity(); }
+  double Yaw() const { return Heading(simulation_.vehicle().body().Pose().getBasis()); }
   void Command(double x, double y, double z, double yaw_rate) {
-    simulation_.spiri().Command({x, y, z}, yaw_rate, simulation_.time());
+    simulation_.vehicle().Command({x, y, z}, yaw_rate, simulation_.time());
   }
   /// Velocity along the heading at take-off.
   double Forward() const { return Velocity().x() * std::cos(0.5) + Velocity().y() * std::sin(0.5); }
@@ -34,7 +34,7 @@ class Flight : public testing::Test {
 
 TEST_F(Flight, TakesOffAndHoversInPlace) {
   RunUntil(5, &simulation_);
-  ASSERT_TRUE(simulation_.spiri().flying());
+  ASSERT_TRUE(simulation_.vehicle().ready());
   double off = 0;
   RunUntil(15, &simulation_, [&] {
     off = std::max<double>(off, (Place() - btVector3(0, 0, btScalar(0.65))).length());
@@ -46,7 +46,7 @@ TEST_F(Flight, TakesOffAndHoversInPlace) {
 
 TEST_F(Flight, DoesNotObeyBeforeItHasTakenOff) {
   RunUntil(1, &simulation_, [&] { Command(1, 0, 0, 0); });
-  EXPECT_FALSE(simulation_.spiri().flying());
+  EXPECT_FALSE(simulation_.vehicle().ready());
   EXPECT_LT(std::hypot(Place().x(), Place().y()), 0.01);
 }
 
@@ -73,7 +73,7 @@ TEST_F(Flight, TiltsNoFurtherThanItsLimit) {
   double tilt = 0;
   RunUntil(8, &simulation_, [&] {
     Command(100, 0, 0, 0);
-    tilt = std::max<double>(tilt, std::acos(simulation_.spiri().body().Pose().getBasis()[2][2]));
+    tilt = std::max<double>(tilt, std::acos(simulation_.vehicle().body().Pose().getBasis()[2][2]));
   });
   EXPECT_GT(tilt, 0.3);
   EXPECT_LT(tilt, 0.38);
@@ -106,7 +106,7 @@ TEST_F(Flight, RefusesCommandsThatAreNotFinite) {
   RunUntil(6, &simulation_);
   RunUntil(8, &simulation_, [&] { Command(1, 0, 0, 0); });
   const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
-  Spiri& spiri = simulation_.spiri();
+  MobileRobot& spiri = simulation_.vehicle();
   EXPECT_FALSE(spiri.Command({nan, 0, 0}, 0, simulation_.time()));
   EXPECT_FALSE(spiri.Command({0, 0, inf}, 0, simulation_.time()));
   EXPECT_TRUE(spiri.Command({1e300, -1e300, 1e300}, 1e300, simulation_.time())) << "clipped";
@@ -143,7 +143,7 @@ TEST_F(Flight, SensorsAreNoisyButRight) {
 
 TEST(FlightSetup, RotorsThatCannotLiftAreAnError) {
   SimulationConfig config = FlightConfig();
-  config.spiri.max_rotor_speed = 300;
+  config.cast.spiri.max_rotor_speed = 300;
   EXPECT_THROW(Simulation(config, ThrowWarning), std::runtime_error);
 }
 

@@ -22,15 +22,15 @@ std::vector<uint8_t> Record(Simulation* simulation) {
   while (simulation->frame() < 150) {
     if (!simulation->Advance().frame) continue;
     const double wave = std::sin(double(simulation->frame()) * 0.1);
-    simulation->spiri().Command({0.8 * wave, 0, 0}, 0.3 * wave, simulation->time());
-    simulation->husky().Command(0.7, 0.5 * wave, simulation->time());
+    simulation->vehicle().Command({0.8 * wave, 0, 0}, 0.3 * wave, simulation->time());
+    simulation->target().Command({0.7, 0, 0}, 0.5 * wave, simulation->time());
     if (simulation->frame() % 30 == 0) {
       simulation->Render(&images, nullptr);
       append(images.left.data(), images.left.size());
       append(images.right.data(), images.right.size());
     }
   }
-  for (const Body& body : {simulation->spiri().body(), simulation->husky().chassis()}) {
+  for (const Body& body : {simulation->vehicle().body(), simulation->target().body()}) {
     const btTransform pose = body.Pose();
     append(&pose.getOrigin(), 3 * sizeof(btScalar));
     const btVector3 velocity = body.Velocity();
@@ -109,13 +109,13 @@ TEST(Simulation, LaneStaysFree) {
 
 TEST(Simulation, CountsTouchesOfTheDrone) {
   SimulationConfig config = FlightConfig();
-  config.husky_place = Placement{1.5, 0, 0};
-  config.spiri_place = Placement{0, 0, 0};
-  config.spiri.take_off_altitude = 0.2;  // Low enough to run into the body.
+  config.cast.target_place = Placement{1.5, 0, 0};
+  config.cast.vehicle_place = Placement{0, 0, 0};
+  config.cast.spiri.take_off_altitude = 0.2;  // Low enough to run into the body.
   Simulation simulation(config, ThrowWarning);
   RunUntil(5, &simulation);
   EXPECT_EQ(simulation.Measure().collisions, 0u);
-  RunUntil(9, &simulation, [&] { simulation.spiri().Command({1, 0, 0}, 0, simulation.time()); });
+  RunUntil(9, &simulation, [&] { simulation.vehicle().Command({1, 0, 0}, 0, simulation.time()); });
   const Truth truth = simulation.Measure();
   EXPECT_GE(truth.collisions, 1u);
   EXPECT_LT(truth.clearance, 0.1);
@@ -202,8 +202,8 @@ TEST(World, ReadsPosesMaterialsAndRobots) {
   EXPECT_GT(world.models.size(), 20u);
   EXPECT_EQ(world.models[0].visuals[0].material.texture_size, 3.0);
   EXPECT_EQ(world.models[0].visuals[0].material.light_map, "media/ground_map.png");
-  EXPECT_NEAR(world.Robot("spiri").pose.getOrigin().x(), -1.5, 1e-6);
-  EXPECT_THROW(world.Robot("rover"), std::runtime_error);
+  EXPECT_NEAR(world.Robot({"spiri"}).pose.getOrigin().x(), -1.5, 1e-6);
+  EXPECT_THROW(world.Robot({"rover"}), std::runtime_error);
 }
 
 TEST(World, MayLieAnywhere) {

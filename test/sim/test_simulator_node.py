@@ -228,8 +228,8 @@ class SimulatorNodeTest(unittest.TestCase):
             "world": "/no/such.world",
             "camera_position": "[.nan, 0, 0]",
             "spiri/max_tilt": "1.6",
-            "spiri_pose": "[20000.0, 0.0, 0.0]",
-            "husky_pose": "[0.0, .inf, 0.0]",
+            "vehicle_pose": "[20000.0, 0.0, 0.0]",
+            "target_pose": "[0.0, .inf, 0.0]",
             "seed": "-1",
             "width": "640.5",
         }.items():

@@ -34,8 +34,8 @@ def simulation_arguments(scenario, seed, resolution, image_noise, world=None):
         "resolution": resolution,
         "image_noise": image_noise,
         "seed": seed,
-        "spiri_pose": _pose(scenario.spiri_pose(seed)),
-        "husky_pose": _pose(scenario.husky_pose(seed)),
+        "vehicle_pose": _pose(scenario.spiri_pose(seed)),
+        "target_pose": _pose(scenario.husky_pose(seed)),
         "world": world.resolve() if world else world_file(scenario.world),
     }
 
