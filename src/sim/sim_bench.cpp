@@ -34,7 +34,7 @@ Costs Measure(const SimulationConfig& config) {
   StereoImages images;
   for (int frame = 0; frame < kTakeOff + kFrames; ++frame) {
     const bool counts = frame >= kTakeOff;
-    simulation.husky().Command(kSpeed, kTurnRate, simulation.time());
+    simulation.target().Command({kSpeed, 0, 0}, kTurnRate, simulation.time());
     const int64_t begin = simulation.time_ns();
     const double start = Now();
     while (!simulation.Advance().frame) continue;
