@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <array>
 #include <opencv2/core.hpp>
 #include <stdexcept>
 
@@ -13,15 +14,42 @@ const cv::Vec3b kBgr(40, 120, 220);
 constexpr int kGreyLevel = 141;  // 0.114 * 40 + 0.587 * 120 + 0.299 * 220
 
 TEST(Image, KnowsTheEncodingsOfTheContractOnly) {
-  EXPECT_EQ(Channels(ParseEncoding("mono8")), 1);
-  EXPECT_EQ(Channels(ParseEncoding("bgr8")), 3);
-  EXPECT_EQ(Channels(ParseEncoding("rgba8")), 4);
-  EXPECT_EQ(Channels(ParseEncoding("bayer_grbg8")), 1);
-  EXPECT_EQ(ParseEncoding("8UC1"), Encoding::kMono);
-  EXPECT_EQ(ParseEncoding("8UC3"), Encoding::kBgr);
-  for (const char* name : {"", "mono16", "32FC1", "MONO8", "bayer_rggb16"}) {
+  const auto expect = [](const char* name, Encoding encoding, int type) {
+    const PixelFormat format = ParseEncoding(name);
+    EXPECT_EQ(format.encoding, encoding) << name;
+    EXPECT_EQ(format.type, type) << name;
+  };
+  expect("mono8", Encoding::kMono, CV_8UC1);
+  expect("8UC1", Encoding::kMono, CV_8UC1);
+  expect("mono16", Encoding::kMono, CV_16UC1);
+  expect("bgr8", Encoding::kBgr, CV_8UC3);
+  expect("8UC3", Encoding::kBgr, CV_8UC3);
+  expect("rgb16", Encoding::kRgb, CV_16UC3);
+  expect("rgba8", Encoding::kRgba, CV_8UC4);
+  expect("yuv422", Encoding::kYuv422, CV_8UC2);
+  expect("bayer_grbg8", Encoding::kBayerGrbg, CV_8UC1);
+  expect("bayer_rggb16", Encoding::kBayerRggb, CV_16UC1);
+  for (const char* name : {"", "mono", "32FC1", "MONO8", "yuv4228", "yuv42216", "bayer_rgbg8"}) {
     EXPECT_THROW(ParseEncoding(name), std::invalid_argument) << name;
   }
+}
+
+TEST(Image, SixteenBitsAreScaledToEight) {
+  cv::Mat buffer;
+  const cv::Mat deep = (cv::Mat_<uint16_t>(1, 4) << 0, 257, 32896, 65535);
+  const cv::Mat scaled = To8Bit(deep, &buffer);
+  EXPECT_EQ(scaled.type(), CV_8UC1);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(scaled.at<uchar>(i), (std::array{0, 1, 128, 255}[i]));
+  EXPECT_EQ(To8Bit(scaled, &buffer).data, scaled.data);
+}
+
+TEST(Image, YuvIsUyvy) {
+  cv::Mat buffer;
+  const cv::Mat raw(4, 6, CV_8UC2,
+                    cv::Scalar(128, 90));  // No colour, so grey level 1.164 (90 - 16).
+  EXPECT_EQ(ToGrey(raw, Encoding::kYuv422, &buffer).at<uchar>(2, 3), 90);
+  EXPECT_EQ(ToTexture(raw, Encoding::kYuv422, &buffer).pixels.at<cv::Vec3b>(2, 3),
+            cv::Vec3b(86, 86, 86));
 }
 
 TEST(Image, GreyIsSharedAndColourWeighted) {
@@ -49,7 +77,7 @@ TEST(Image, AlphaIsLeftOut) {
     const cv::Scalar pixel(kBgr[name == "bgra8" ? 0 : 2], kBgr[1], kBgr[name == "bgra8" ? 2 : 0],
                            9);
     const cv::Mat raw(4, 6, CV_8UC4, pixel);
-    const Encoding encoding = ParseEncoding(name);
+    const Encoding encoding = ParseEncoding(name).encoding;
     EXPECT_EQ(ToGrey(raw, encoding, &buffer).at<uchar>(2, 3), kGreyLevel) << name;
     const Texture texture = ToTexture(raw, encoding, &buffer);
     EXPECT_EQ(texture.pixels.at<cv::Vec3b>(2, 3), kBgr) << name;
@@ -66,7 +94,7 @@ TEST(Image, EveryBayerPatternGivesItsColourBack) {
         raw.at<uchar>(y, x) = colour == 'b' ? kBgr[0] : colour == 'g' ? kBgr[1] : kBgr[2];
       }
     }
-    const Encoding encoding = ParseEncoding("bayer_" + pattern + "8");
+    const Encoding encoding = ParseEncoding("bayer_" + pattern + "8").encoding;
     EXPECT_EQ(ToTexture(raw, encoding, &buffer).pixels.at<cv::Vec3b>(4, 4), kBgr) << pattern;
     EXPECT_NEAR(ToGrey(raw, encoding, &buffer).at<uchar>(4, 4), kGreyLevel, 1) << pattern;
   }
