@@ -81,6 +81,8 @@ class Flight:
             elif t >= self._scenario.box_at:
                 self._box_target(frame["truth"], alive)
                 boxed_at, began = t, time.monotonic()
+                if not self._scenario.scripted:
+                    self._stage.run_ahead()
             else:
                 continue
             for watch in self._watchers:

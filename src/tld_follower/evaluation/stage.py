@@ -53,8 +53,9 @@ def _twist(forward, left, turn):
 class Stage:
     """Where a scenario is played: a simulation in lockstep that waits for /cmd_vel and /husky/cmd_vel.
 
-    A frame is answered only once every watched message of it is here, so that every run of a seed sees the
-    same commands at the same frames.
+    A frame is answered only once every watched message of it is here and has been dealt with, so that every
+    run of a seed sees the same commands at the same frames. Where the follower answers as well, `run_ahead`
+    does without that wait, and no less surely: the follower's command alone then says that a frame is done.
 
     Parameters
     ----------
@@ -70,6 +71,7 @@ class Stage:
         self._sources = {kind: _SOURCES[kind] for kind in watched}
         self._frames = {}  # stamp -> {kind: message}
         self._changed = threading.Condition()
+        self._ahead = False
         self._drivers = {"/husky/cmd_vel": self._target_command}
         if scenario.scripted:
             self._drivers["/cmd_vel"] = scenario.drone_command
@@ -90,8 +92,21 @@ class Stage:
         speed, turn = self._scenario.target_command(t, seed)
         return speed, 0.0, turn
 
+    def run_ahead(self):
+        """Answer each frame as soon as its truth is here, from the next frame on.
+
+        For scenarios in which the follower flies: the simulation still waits for its command.
+        """
+        self._ahead = True
+
+    def _answer(self, t):
+        for topic, command_at in self._drivers.items():
+            self._publishers[topic].publish(_twist(*command_at(t, self._seed)))
+
     def _store(self, message, kind):
         stamp = message.captured if kind == "box" else message.header.stamp
+        if kind == "truth" and self._ahead and stamp.to_sec() < self._scenario.end:
+            self._answer(stamp.to_sec())
         with self._changed:
             self._frames.setdefault(stamp, {})[kind] = message
             self._changed.notify_all()
@@ -124,11 +139,12 @@ class Stage:
         while True:
             done, frame = self._next_frame(done, alive)
             t = done.to_sec()
+            answered_ahead = self._ahead
             yield t, frame
             if t >= self._scenario.end:
                 return
-            for topic, command_at in self._drivers.items():
-                self._publishers[topic].publish(_twist(*command_at(t, self._seed)))
+            if not answered_ahead:
+                self._answer(t)
 
     def _next_frame(self, after, alive):
         """Wait for the next frame that is complete; return its stamp and messages."""

@@ -11,6 +11,7 @@ from tld_follower.following.parameters import Parameters
 from tld_follower.msg import BoundingBoxStamped, FollowState
 from tld_follower.nodes.by_stamp import ByStamp
 from tld_follower.nodes.conversions import cloud_points, message_box
+from tld_follower.nodes.memory import keep_memory
 from tld_follower.nodes.newest import Newest
 from tld_follower.nodes.settings import fatal_if_wrong
 
@@ -117,6 +118,7 @@ class FollowerNode:
 
 def main():
     """Run the node until ROS shuts down."""
+    keep_memory()
     rospy.init_node("pointsdepthA")
     with fatal_if_wrong():
         node = FollowerNode()

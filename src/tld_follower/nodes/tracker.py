@@ -12,6 +12,7 @@ from tld_follower.box import Box
 from tld_follower.msg import BoundingBox
 from tld_follower.nodes.by_stamp import ByStamp
 from tld_follower.nodes.conversions import box_message, cloud_points, grey_image, image_array
+from tld_follower.nodes.memory import keep_memory
 from tld_follower.nodes.newest import Newest
 from tld_follower.nodes.requests import Requests
 from tld_follower.nodes.settings import checked, fatal_if_wrong
@@ -255,6 +256,7 @@ class TrackerNode:
 def main():
     """Run the node until ROS shuts down."""
     cv2.setNumThreads(1)  # the other cores belong to the other nodes
+    keep_memory()
     rospy.init_node("NODE")
     with fatal_if_wrong():
         node = TrackerNode()
