@@ -5,6 +5,7 @@
 import sys
 from pathlib import Path
 
+import citadel
 import drone_media
 import ground_media
 import husky_media
@@ -19,6 +20,7 @@ def main():
     directory.mkdir(parents=True, exist_ok=True)
     for module in (ground_media, obstacle_media, husky_media, drone_media):
         module.write(directory)
+    citadel.write_media(directory)
 
 
 if __name__ == "__main__":

@@ -113,7 +113,29 @@ def post(size=256):
     return image
 
 
+def stone(size=512):
+    """Draw rough ashlar, 8 courses of blocks of many lengths; one repeat is 2 m."""
+    rng = np.random.default_rng(27)
+    image = paint.flat(size, size, (92, 98, 104))
+    tall = size // 8
+    for course in range(8):
+        joints = np.sort(rng.choice(np.arange(0, size, 32), 6, replace=False))
+        for left, right in zip(joints, [*joints[1:], joints[0] + size], strict=True):
+            grey = rng.uniform(0.45, 0.8)
+            warm = rng.uniform(0.88, 1.02)
+            colour = tuple(float(c) for c in (grey * warm**2, grey * warm, grey))
+            for shift in (0, -size):  # The block that crosses the edge shows on both sides.
+                corner = (int(left) + shift + 3, course * tall + 3)
+                opposite = (int(right) + shift - 4, (course + 1) * tall - 4)
+                cv2.rectangle(image, corner, opposite, colour, -1)
+    paint.tint(image, paint.fractal(rng, size, size, {110: 0.08, 40: 0.1, 14: 0.12, 6: 0.12, 2.5: 0.1}))
+    paint.spots(rng, image, 200, (1, 10), (58, 64, 70))
+    paint.spots(rng, image, 60, (4, 22), (70, 112, 96), (0.2, 0.5))
+    paint.cracks(rng, image, 10, 30, (48, 52, 56), 0.7)
+    return image
+
+
 def write(directory):
     """Write one PNG for each kind of surface."""
-    for draw in (brick, concrete, crate, container, barrel, post):
+    for draw in (brick, concrete, crate, container, barrel, post, stone):
         paint.save(directory / f"{draw.__name__}.png", draw())

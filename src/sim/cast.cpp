@@ -1,23 +1,42 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/cast.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace tld_follower::sim {
 namespace {
 
-constexpr double kMastFoot = 0.2;  // Inside the body, above base_link [m].
+constexpr double kFootprint = 0.6;  // No part of a robot is farther from its middle [m].
+constexpr double kMastFoot = 0.2;   // Inside the body, above base_link [m].
+
+// Of the ground under a robot at this place: it starts above all of it.
+double HighestGround(const World& world, double x, double y) {
+  double highest = 0;
+  for (const double dx : {-kFootprint, 0.0, kFootprint}) {
+    for (const double dy : {-kFootprint, 0.0, kFootprint}) {
+      highest = std::max(highest, world.GroundHeight(x + dx, y + dy));
+    }
+  }
+  return highest;
+}
 
 CastMember Find(const World& world, const std::string& drone, const std::string& ground,
-                const std::optional<Placement>& place) {
+                const std::optional<Placement>& given) {
   const RobotPlacement& placement = world.Robot({drone, ground});
-  CastMember member{placement.name, LoadRobot(placement.file), placement.pose,
-                    placement.name == drone};
-  if (place) {
-    member.start.setRotation(btQuaternion(btVector3(0, 0, 1), btScalar(place->yaw)));
-    member.start.setOrigin(
-        {btScalar(place->x), btScalar(place->y), placement.pose.getOrigin().z()});
+  CastMember member;
+  member.name = placement.name;
+  member.robot = LoadRobot(placement.file);
+  member.start = placement.pose;
+  member.flies = placement.name == drone;
+  btVector3& place = member.start.getOrigin();
+  if (given) {
+    const double above = place.z() - HighestGround(world, place.x(), place.y());
+    place.setValue(btScalar(given->x), btScalar(given->y),
+                   btScalar(HighestGround(world, given->x, given->y) + above));
+    member.start.setRotation(btQuaternion(btVector3(0, 0, 1), btScalar(given->yaw)));
   }
+  member.ground = HighestGround(world, place.x(), place.y());
   return member;
 }
 
@@ -66,7 +85,9 @@ std::unique_ptr<MobileRobot> Cast::MakeVehicle(Physics* physics) const {
   if (!vehicle_.flies) {
     return std::make_unique<Husky>(config_.husky, vehicle_.robot, vehicle_.start, physics);
   }
-  return std::make_unique<Spiri>(config_.spiri, vehicle_.robot, vehicle_.start, physics);
+  SpiriParameters grounded = config_.spiri;
+  grounded.take_off_altitude += vehicle_.ground;
+  return std::make_unique<Spiri>(grounded, vehicle_.robot, vehicle_.start, physics);
 }
 
 std::unique_ptr<MobileRobot> Cast::MakeTarget(Physics* physics) const {

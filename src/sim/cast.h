@@ -13,7 +13,7 @@
 
 namespace tld_follower::sim {
 
-/// A place on the ground that replaces the world's [m, rad].
+/// A place that replaces the world's, as high above the ground there [m, rad].
 struct Placement {
   double x = 0, y = 0, yaw = 0;
 };
@@ -38,6 +38,7 @@ struct CastMember {
   std::string name;
   Robot robot;
   btTransform start = btTransform::getIdentity();
+  double ground = 0;  ///< Height of the ground at its start [m].
   bool flies = false;
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/distance.h"
 
+#include <BulletCollision/CollisionShapes/btConcaveShape.h>
+#include <BulletCollision/CollisionShapes/btTriangleShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btGjkEpaPenetrationDepthSolver.h>
 #include <BulletCollision/NarrowPhaseCollision/btGjkPairDetector.h>
 #include <BulletCollision/NarrowPhaseCollision/btPointCollector.h>
@@ -11,6 +13,8 @@
 
 namespace tld_follower::sim {
 namespace {
+
+constexpr btScalar kReach = 5;  // Terrain farther than this counts as infinitely far [m].
 
 double ConvexToConvex(const btConvexShape& a, const btTransform& pose_a, const btConvexShape& b,
                       const btTransform& pose_b) {
@@ -34,6 +38,28 @@ double PlaneToConvex(const btStaticPlaneShape& plane, const btTransform& plane_p
   return normal.dot(lowest) - plane.getPlaneConstant();
 }
 
+double TrianglesToConvex(const btConcaveShape& triangles, const btTransform& triangles_pose,
+                         const btConvexShape& shape, const btTransform& pose) {
+  struct Nearest : btTriangleCallback {
+    Nearest(const btConvexShape& shape, const btTransform& pose) : shape(shape), pose(pose) {}
+    void processTriangle(btVector3* corners, int, int) override {
+      btTriangleShape triangle(corners[0], corners[1], corners[2]);
+      triangle.setMargin(0);
+      distance =
+          std::min(distance, ConvexToConvex(triangle, btTransform::getIdentity(), shape, pose));
+    }
+    const btConvexShape& shape;
+    const btTransform pose;
+    double distance = std::numeric_limits<double>::infinity();
+  };
+  Nearest nearest(shape, triangles_pose.inverse() * pose);
+  btVector3 low, high;
+  shape.getAabb(nearest.pose, low, high);
+  const btVector3 reach(kReach, kReach, kReach);
+  triangles.processAllTriangles(&nearest, low - reach, high + reach);
+  return nearest.distance;
+}
+
 }  // namespace
 
 double Distance(const btCollisionShape& a, const btTransform& pose_a, const btCollisionShape& b,
@@ -47,12 +73,15 @@ double Distance(const btCollisionShape& a, const btTransform& pose_a, const btCo
     }
     return nearest;
   }
-  if (a.isCompound() || b.getShapeType() == STATIC_PLANE_PROXYTYPE) {
+  if (a.isCompound() || b.isConcave()) {
     return Distance(b, pose_b, a, pose_a);
   }
   const auto& convex = static_cast<const btConvexShape&>(b);
   if (a.getShapeType() == STATIC_PLANE_PROXYTYPE) {
     return PlaneToConvex(static_cast<const btStaticPlaneShape&>(a), pose_a, convex, pose_b);
+  }
+  if (a.isConcave()) {
+    return TrianglesToConvex(static_cast<const btConcaveShape&>(a), pose_a, convex, pose_b);
   }
   return ConvexToConvex(static_cast<const btConvexShape&>(a), pose_a, convex, pose_b);
 }

@@ -6,7 +6,8 @@
 namespace tld_follower::sim {
 
 /// Distance between two shapes [m] by Gilbert-Johnson-Keerthi; 0 or less where they overlap.
-/// Understood: convex primitives, compounds of them, and a plane as one of the two.
+/// Understood: convex primitives, compounds of them, and a plane or terrain as one of
+/// the two; terrain farther than 5 m in each axis is infinitely far.
 double Distance(const btCollisionShape& a, const btTransform& pose_a, const btCollisionShape& b,
                 const btTransform& pose_b);
 

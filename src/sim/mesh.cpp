@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/mesh.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -117,6 +118,31 @@ Mesh MakeSphere(double radius, double lowest, double highest, int rings, bool in
   return mesh;
 }
 
+Mesh MakeTerrain(const Terrain& terrain, double tile) {
+  Mesh mesh;
+  for (int row = 0; row < terrain.rows; ++row) {
+    for (int column = 0; column < terrain.columns; ++column) {
+      const int west = std::max(column - 1, 0), east = std::min(column + 1, terrain.columns - 1);
+      const int south = std::max(row - 1, 0), north = std::min(row + 1, terrain.rows - 1);
+      const btVector3 along_x = terrain.Point(east, row) - terrain.Point(west, row);
+      const btVector3 along_y = terrain.Point(column, north) - terrain.Point(column, south);
+      const btVector3 p = terrain.Point(column, row);
+      Add(p, along_x.cross(along_y).normalized(), p.x() / tile, -p.y() / tile, &mesh);
+      mesh.vertices.back().light_uv[0] = float(column) / float(terrain.columns - 1);
+      mesh.vertices.back().light_uv[1] = 1.f - float(row) / float(terrain.rows - 1);
+    }
+  }
+  const uint32_t stride = uint32_t(terrain.columns);
+  for (uint32_t row = 0; row + 1 < uint32_t(terrain.rows); ++row) {
+    for (uint32_t column = 0; column + 1 < stride; ++column) {
+      const uint32_t a = row * stride + column, b = a + 1, c = b + stride, d = a + stride;
+      AddTriangle(a, b, d, &mesh);
+      AddTriangle(b, c, d, &mesh);
+    }
+  }
+  return mesh;
+}
+
 }  // namespace
 
 Mesh MakePrimitive(const Geometry& geometry, double texture_size) {
@@ -127,6 +153,8 @@ Mesh MakePrimitive(const Geometry& geometry, double texture_size) {
       return MakeCylinder(geometry.size.x(), geometry.size.z(), texture_size);
     case Geometry::Type::kSphere:
       return MakeSphere(geometry.size.x(), -M_PI / 2, M_PI / 2, kSides / 2, false);
+    case Geometry::Type::kTerrain:
+      return MakeTerrain(*geometry.terrain, texture_size);
     case Geometry::Type::kPlane:
       return MakePlane(geometry.size, texture_size);
     case Geometry::Type::kMesh:

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sim/physics.h"
 
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
+
 #include <stdexcept>
 
 namespace tld_follower::sim {
@@ -67,6 +69,16 @@ btCollisionShape* Physics::MakeShape(const Geometry& geometry) {
     case Geometry::Type::kPlane:
       shape = std::make_unique<btStaticPlaneShape>(btVector3(0, 0, 1), btScalar(0));
       break;
+    case Geometry::Type::kTerrain: {
+      const Terrain& terrain = *geometry.terrain;
+      // Bounds that are symmetric keep z = 0 of the heights at z = 0 of the shape.
+      shape = std::make_unique<btHeightfieldTerrainShape>(
+          terrain.columns, terrain.rows, terrain.heights.data(), -size.z(), size.z(), /*upAxis=*/2,
+          /*flipQuadEdges=*/false);
+      shape->setLocalScaling(
+          {size.x() / btScalar(terrain.columns - 1), size.y() / btScalar(terrain.rows - 1), 1});
+      break;
+    }
     case Geometry::Type::kMesh:
       throw std::runtime_error("meshes are not used for collisions");
   }

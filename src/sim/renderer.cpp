@@ -114,6 +114,11 @@ cv::Mat MissingTexture() {
   return image;
 }
 
+// What has a light map and receives shadows, but casts none.
+bool IsGround(const Geometry& geometry) {
+  return geometry.type == Geometry::Type::kPlane || geometry.type == Geometry::Type::kTerrain;
+}
+
 btTransform Place(const btTransform& pose, int frame, const std::vector<btTransform>& frames) {
   return frame < 0 ? pose : frames[size_t(frame)] * pose;
 }
@@ -148,7 +153,7 @@ Renderer::Renderer(const StereoCamera& camera, const World& world, const Scene& 
     Item item;
     item.mesh = AddMesh(node.visual.geometry, material.texture_size);
     item.texture = Texture(material.texture);
-    item.ground = node.visual.geometry.type == Geometry::Type::kPlane;
+    item.ground = IsGround(node.visual.geometry);
     item.light_map = material.light_map.empty() ? NeutralLightMap() : Texture(material.light_map);
     item.colour = material.colour;
     item.pose = node.visual.pose;
@@ -157,7 +162,7 @@ Renderer::Renderer(const StereoCamera& camera, const World& world, const Scene& 
     items_.push_back(item);
   }
   for (const ShadowNode& node : scene.shadows) {
-    if (node.shape.geometry.type == Geometry::Type::kPlane) continue;
+    if (IsGround(node.shape.geometry)) continue;
     shadows_.push_back({AddMesh(node.shape.geometry, 1.0), node.shape.pose, node.frame});
   }
   if (!world.sky_texture.empty()) {

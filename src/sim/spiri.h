@@ -35,7 +35,7 @@ struct SpiriParameters {
   double max_speed_z = 1.0;            ///< [m/s]
   double max_yaw_rate = 2.0;           ///< [rad/s]
   double command_timeout = 0.3;        ///< Hover if no command came for so long [s].
-  double take_off_altitude = 0.65;     ///< Of the body's origin above the world's z = 0 [m].
+  double take_off_altitude = 0.65;     ///< Of the body's origin; here above the world's z = 0 [m].
   double take_off_speed = 0.5;         ///< [m/s]
 };
 

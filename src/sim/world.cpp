@@ -3,6 +3,7 @@
 
 #include <console_bridge/console.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -52,7 +53,25 @@ void CheckSize(const Geometry& geometry, const std::string& owner) {
   }
 }
 
-Geometry ReadGeometry(const sdf::Geometry& geometry, const std::string& owner) {
+// An SDF <heightmap>; what it says of textures is left to <material>.
+Geometry ReadTerrain(const sdf::Heightmap& map, const Resources& resources,
+                     const std::string& owner) {
+  Geometry result;
+  result.type = Geometry::Type::kTerrain;
+  result.size = ToBullet(map.Size());
+  result.mesh = map.Uri();
+  CheckSize(result, owner);
+  if (map.Position() != ignition::math::Vector3d::Zero) {
+    throw std::runtime_error("'" + owner + "' moves its heightmap by <pos>; use <pose>");
+  }
+  const std::string file = resources.Find(map.Uri());
+  if (file.empty()) throw std::runtime_error("there is no heightmap '" + map.Uri() + "'");
+  result.terrain = std::make_shared<const Terrain>(LoadTerrain(file, result.size));
+  return result;
+}
+
+Geometry ReadGeometry(const sdf::Geometry& geometry, const Resources& resources,
+                      const std::string& owner) {
   Geometry result;
   switch (geometry.Type()) {
     case sdf::GeometryType::BOX:
@@ -83,9 +102,12 @@ Geometry ReadGeometry(const sdf::Geometry& geometry, const std::string& owner) {
       result.mesh = geometry.MeshShape()->Uri();
       result.size = ToBullet(geometry.MeshShape()->Scale());
       break;
+    case sdf::GeometryType::HEIGHTMAP:
+      return ReadTerrain(*geometry.HeightmapShape(), resources, owner);
     default:
-      throw std::runtime_error("'" + owner +
-                               "' has a geometry other than box, cylinder, sphere, plane or mesh");
+      throw std::runtime_error(
+          "'" + owner +
+          "' has a geometry other than box, cylinder, sphere, plane, heightmap or mesh");
   }
   CheckSize(result, owner);
   return result;
@@ -146,7 +168,7 @@ std::vector<Waypoint> ReadScript(const sdf::Model& model) {
   return script;
 }
 
-Model ReadModel(const sdf::Model& model, const WarningSink& warn) {
+Model ReadModel(const sdf::Model& model, const Resources& resources, const WarningSink& warn) {
   Model result;
   result.name = model.Name();
   result.script = ReadScript(model);
@@ -161,12 +183,12 @@ Model ReadModel(const sdf::Model& model, const WarningSink& warn) {
     for (uint64_t v = 0; v < link.VisualCount(); ++v) {
       const sdf::Visual& visual = *link.VisualByIndex(v);
       result.visuals.push_back({link_pose * Resolve(visual, visual.Name()),
-                                ReadGeometry(*visual.Geom(), model.Name()),
+                                ReadGeometry(*visual.Geom(), resources, model.Name()),
                                 ReadMaterial(visual.Material())});
     }
     for (uint64_t c = 0; c < link.CollisionCount(); ++c) {
       const sdf::Collision& collision = *link.CollisionByIndex(c);
-      Geometry geometry = ReadGeometry(*collision.Geom(), model.Name());
+      Geometry geometry = ReadGeometry(*collision.Geom(), resources, model.Name());
       if (geometry.type == Geometry::Type::kMesh) {
         throw std::runtime_error("'" + model.Name() +
                                  "' has a mesh as <collision>; use primitives");
@@ -233,6 +255,19 @@ const RobotPlacement& World::Robot(const std::vector<std::string>& names) const 
   throw std::runtime_error("the world '" + file + "' does not <include> a robot named " + listed);
 }
 
+double World::GroundHeight(double x, double y) const {
+  double height = 0;
+  for (const Model& model : models) {
+    for (const Collision& collision : model.collisions) {
+      if (collision.geometry.type != Geometry::Type::kTerrain) continue;
+      const btVector3 place = collision.pose.inverse() * btVector3(btScalar(x), btScalar(y), 0);
+      const double own = collision.geometry.terrain->Height(place.x(), place.y());
+      height = std::max(height, own + collision.pose.getOrigin().z());
+    }
+  }
+  return height;
+}
+
 World LoadWorld(const std::string& file, const Resources& resources, const WarningSink& warn) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) {
@@ -275,7 +310,7 @@ World LoadWorld(const std::string& file, const Resources& resources, const Warni
       world.sun_colour = ToRgb(light.Diffuse());
     }
     for (uint64_t i = 0; i < source.ModelCount(); ++i) {
-      world.models.push_back(ReadModel(*source.ModelByIndex(i), warn));
+      world.models.push_back(ReadModel(*source.ModelByIndex(i), resources, warn));
     }
     for (uint64_t i = 0; i < source.InterfaceModelCount(); ++i) {
       const sdf::NestedInclude& include = *source.InterfaceModelNestedIncludeByIndex(i);

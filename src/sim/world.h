@@ -48,6 +48,9 @@ struct World {
   std::vector<Model> models;
   std::vector<RobotPlacement> robots;
 
+  /// Height of the terrain at a place [m]; 0 where there is none.
+  double GroundHeight(double x, double y) const;
+
   /// The one robot that has one of these names. Throws std::runtime_error if the world places none
   /// of them or more than one.
   const RobotPlacement& Robot(const std::vector<std::string>& names) const;
@@ -58,7 +61,8 @@ struct World {
 /// Own elements, in a namespace as SDF wants it: `<tld:texture_size>` in a `<material>` is the edge
 /// of one texture repeat [m]; `<tld:sky>` in the `<world>` names the texture of the sky dome.
 /// `<tld:waypoint>` in a `<model>`, "t x y z roll pitch yaw" [s, m, rad], moves it on a script.
-/// `<pbr><metal><light_map>` is stretched once over a plane and breaks up the repeats.
+/// `<pbr><metal><light_map>` is stretched once over a plane or a heightmap and breaks up the
+/// repeats.
 ///
 /// Throws std::runtime_error with one readable sentence that names the file if it cannot be read,
 /// is no world, or has a number that cannot be meant: not finite, or a size that is not positive.
