@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/battery.h"
 #include "sim/physics.h"
 #include "sim/robot.h"
 
@@ -50,6 +51,9 @@ class MobileRobot {
   /// As its own drive tells.
   virtual OdometrySample Odometry() const = 0;
   virtual std::vector<JointSample> Joints() const { return {}; }
+
+  /// What it lives on; null where that is not simulated.
+  virtual const Battery* battery() const { return nullptr; }
 
   virtual bool flies() const = 0;
   /// It obeys commands: it is where it works, on the ground or in the air.

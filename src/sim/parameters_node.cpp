@@ -35,6 +35,11 @@ void ReadNotNegative(const ros::NodeHandle& handle, const std::string& name, dou
   if (*value < 0) Fail(name, "0 or more");
 }
 
+void ReadShare(const ros::NodeHandle& handle, const std::string& name, double* value) {
+  ReadFinite(handle, name, value);
+  if (!(*value >= 0 && *value <= 1)) Fail(name, "from 0 to 1");
+}
+
 // ROS itself would round a fraction to the next whole number.
 int ReadWhole(const ros::NodeHandle& handle, const std::string& name, int value) {
   const std::string what = "a whole number, 0 or more";
@@ -103,6 +108,16 @@ void ReadSpiri(const ros::NodeHandle& handle, SpiriParameters* p) {
   ReadNotNegative(handle, "spiri/max_yaw_rate", &p->max_yaw_rate);
   ReadPositive(handle, "spiri/command_timeout", &p->command_timeout);
   ReadPositive(handle, "spiri/take_off_speed", &p->take_off_speed);
+  ReadPositive(handle, "spiri/rotor_radius", &p->rotor_radius);
+  ReadShare(handle, "spiri/rotor_efficiency", &p->rotor_efficiency);
+  if (!(p->rotor_efficiency > 0)) Fail("spiri/rotor_efficiency", "positive");
+  ReadNotNegative(handle, "spiri/electronics_power", &p->electronics_power);
+  ReadShare(handle, "spiri/reserve", &p->reserve);
+  ReadPositive(handle, "spiri/battery/capacity", &p->battery.capacity);
+  ReadPositive(handle, "spiri/battery/full_voltage", &p->battery.full_voltage);
+  ReadPositive(handle, "spiri/battery/empty_voltage", &p->battery.empty_voltage);
+  ReadPositive(handle, "spiri/battery/resistance", &p->battery.resistance);
+  ReadShare(handle, "spiri/battery/initial_charge", &p->battery.initial_charge);
   ReadPositive(handle, "take_off_altitude", &p->take_off_altitude);
 }
 

@@ -50,6 +50,10 @@ class Physics {
   btHingeConstraint* AddHinge(const Body& parent, const Body& child, const btVector3& pivot,
                               const btVector3& axis);
 
+  /// Velocity of the air, world axes [m/s]; calm at first.
+  void SetWind(const btVector3& wind) { wind_ = wind; }
+  const btVector3& wind() const { return wind_; }
+
   /// Advances by kStep. Forces that were applied to the bodies act during this step. Models with a
   /// script move to where they are at `time` [s], the end of the step; nothing stops them.
   void Step(double time);
@@ -95,6 +99,7 @@ class Physics {
   std::vector<Moving> moving_;
   std::vector<std::unique_ptr<btTypedConstraint>> constraints_;
   std::unique_ptr<btDiscreteDynamicsWorld> world_;
+  btVector3 wind_{0, 0, 0};
 };
 
 }  // namespace tld_follower::sim

@@ -9,7 +9,8 @@ namespace {
 const ros::WallDuration kIdle(0.01);   // How long a paused loop sleeps.
 const ros::WallDuration kPoll(0.001);  // How long a waiting loop goes without serving services.
 constexpr double kCatchUp = 0.1;       // Lateness up to this is made up for, more is let go [s].
-const ros::WallDuration kWarningPeriod(5.0);  // Of the same warning.
+constexpr int64_t kDiagnosticPeriod = 1000000000;  // Of simulated time [ns].
+const ros::WallDuration kWarningPeriod(5.0);       // Of the same warning.
 
 void Warn(const std::string& message) { ROS_WARN_STREAM(message); }
 
@@ -28,10 +29,12 @@ SimNode::SimNode()
       parameters_(ReadParameters(private_handle_)),
       simulation_(parameters_.simulation, Warn),
       publishers_(handle_, private_handle_, simulation_),
+      diagnostics_(handle_, simulation_, parameters_.mode),
       paused_(parameters_.paused) {
   handle_.setCallbackQueue(&command_queue_);
   Subscribe("cmd_vel", &Simulation::vehicle, &vehicle_commands_);
   Subscribe(simulation_.cast().target().name + "/cmd_vel", &Simulation::target, &target_commands_);
+  wind_ = handle_.subscribe("wind", 10, &SimNode::OnWind, this);
   pause_ = private_handle_.advertiseService("pause_physics", &SimNode::OnPause, this);
   unpause_ = private_handle_.advertiseService("unpause_physics", &SimNode::OnUnpause, this);
   reset_world_ = private_handle_.advertiseService("reset_world", &SimNode::OnResetWorld, this);
@@ -73,6 +76,10 @@ ros::Time SimNode::Stamp() const {
 void SimNode::Advance() {
   const Moment moment = simulation_.Advance();
   publishers_.Publish(&simulation_, moment, Stamp());
+  if (simulation_.time_ns() % kDiagnosticPeriod == 0) {
+    pace_.real_time_factor = publishers_.real_time_factor();
+    diagnostics_.Publish(simulation_, pace_, Stamp());
+  }
   if (moment.frame && parameters_.mode == Mode::kLockstep) {
     waiting_ = true;
     vehicle_commands_.came = target_commands_.came = false;
@@ -90,6 +97,7 @@ bool SimNode::WaitsForCommands() {
     waiting_ = false;
   } else if ((ros::WallTime::now() - frame_published_).toSec() > parameters_.lockstep_timeout) {
     waiting_ = false;
+    ++pace_.unanswered_frames;
     ROS_WARN(
         "lockstep: no %s answered frame %lu within %.1f s (%s); going on without. If it comes "
         "late, "
@@ -111,6 +119,8 @@ double SimNode::SecondsAhead() {
   if (ahead > -kCatchUp) return ahead;
   anchor_time_ = simulation_.time();
   anchor_wall_ = now;
+  ++pace_.late_frames;
+  pace_.lost_time -= ahead;
   if (IsDue(&slip_warning_)) {
     ROS_WARN("slower than real time: %.0f ms late, real-time factor %.2f", -1e3 * ahead,
              publishers_.real_time_factor());
@@ -141,6 +151,14 @@ void SimNode::OnCommand(const geometry_msgs::Twist& twist, MobileRobot* robot, C
   if (!finite && IsDue(&commands->warning)) {
     ROS_WARN("%s is not finite; %s", commands->subscriber.getTopic().c_str(),
              robot->flies() ? "hovering" : "stopping");
+  }
+}
+
+void SimNode::OnWind(const geometry_msgs::Vector3& wind) {
+  const btVector3 velocity{btScalar(wind.x), btScalar(wind.y), btScalar(wind.z)};
+  if (!simulation_.SetWind(velocity) && IsDue(&wind_warning_)) {
+    ROS_WARN("%s is not finite or no wind that is survived; it stays as it was",
+             wind_.getTopic().c_str());
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <geometry_msgs/Twist.h>
+#include <geometry_msgs/Vector3.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <std_srvs/Empty.h>
@@ -10,6 +11,7 @@
 #include <cstdint>
 #include <string>
 
+#include "sim/diagnostics_node.h"
 #include "sim/parameters_node.h"
 #include "sim/publishers_node.h"
 
@@ -37,6 +39,7 @@ class SimNode {
 
   void Subscribe(const std::string& topic, MobileRobot& (Simulation::*robot)(), Commands* commands);
   void OnCommand(const geometry_msgs::Twist& twist, MobileRobot* robot, Commands* commands);
+  void OnWind(const geometry_msgs::Vector3& wind);
   bool OnPause(Empty::Request&, Empty::Response&);
   bool OnUnpause(Empty::Request&, Empty::Response&);
   bool OnResetWorld(Empty::Request&, Empty::Response&);
@@ -56,7 +59,9 @@ class SimNode {
   NodeParameters parameters_;
   Simulation simulation_;
   Publishers publishers_;
+  Diagnostics diagnostics_;
   Commands vehicle_commands_, target_commands_;
+  ros::Subscriber wind_;
   ros::ServiceServer pause_, unpause_, reset_world_, reset_simulation_, step_;
 
   bool paused_;
@@ -66,7 +71,8 @@ class SimNode {
   // Realtime: a moment of the simulation and the wall-clock time at which it is due.
   double anchor_time_ = 0;
   ros::WallTime anchor_wall_;
-  ros::WallTime slip_warning_;
+  ros::WallTime slip_warning_, wind_warning_;
+  Pace pace_;
 };
 
 }  // namespace tld_follower::sim

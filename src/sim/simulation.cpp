@@ -16,6 +16,8 @@ constexpr int64_t kNanosecondsPerStep = 1000000000 / kStepsPerSecond;
 constexpr int64_t kStepsPerTick = 5;
 static_assert(Physics::kStep * kStepsPerSecond == 1.0);
 
+constexpr double kHurricane = 40.0;  // [m/s]
+
 // Two touches of the same object within this time belong to one episode.
 constexpr int64_t kEpisodeGap = kStepsPerSecond / 5;
 
@@ -155,6 +157,12 @@ void Simulation::Render(StereoImages* images, TargetMask* mask) {
   renderer_->Render(frames.front() * camera_.Mount(), frames, images, mask);
   image_noise_.Add(frame_, Eye::kLeft, &images->left);
   image_noise_.Add(frame_, Eye::kRight, &images->right);
+}
+
+bool Simulation::SetWind(const btVector3& wind) {
+  if (!(wind.length() <= kHurricane)) return false;
+  state_->physics.SetWind(wind);
+  return true;
 }
 
 Truth Simulation::Measure() const {

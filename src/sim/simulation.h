@@ -63,6 +63,10 @@ class Simulation {
   double time() const { return double(time_ns()) * 1e-9; }
   uint64_t frame() const { return frame_; }  ///< Number of the latest frame; 0 before the first.
 
+  /// Velocity of the air until the next reset, world axes [m/s]; calm at first. Returns false for
+  /// one that is not finite or blows faster than a hurricane, 40 m/s, which changes nothing.
+  bool SetWind(const btVector3& wind);
+
   /// Draws the stereo pair of this moment; also finds the target's pixels unless `mask` is null.
   void Render(StereoImages* images, TargetMask* mask);
   /// Computes the truth of this moment.

@@ -11,6 +11,9 @@ namespace {
 constexpr double kMaxHeadingError = 0.3;   // Heading and altitude that are held never run away
 constexpr double kMaxAltitudeError = 0.3;  // from the drone by more than this [rad, m].
 constexpr double kStillSpeed = 0.1;        // Slower than this, the place is held [m/s].
+constexpr double kAirDensity = 1.225;      // At sea level [kg/m^3].
+constexpr double kGroundEffectReach = 5;   // Above so many rotor radii it is 0.3 % and left out.
+constexpr double kStanding = 0.3;          // The rotors stop so long after the landing [s].
 constexpr double kTakenOff = 0.02;  // Take-off ends so near its altitude [m], this slow [m/s].
 
 double Wrap(double angle) { return std::remainder(angle, 2 * M_PI); }
@@ -40,7 +43,7 @@ double Heading(const btMatrix3x3& attitude) { return std::atan2(attitude[1][0], 
 
 Spiri::Spiri(const SpiriParameters& parameters, const Robot& robot, const btTransform& pose,
              Physics* physics)
-    : parameters_(parameters), start_(pose) {
+    : parameters_(parameters), physics_(physics), start_(pose), battery_(parameters.battery) {
   std::vector<const RobotLink*> rigid;
   for (const RobotLink& link : robot.links) rigid.push_back(&link);
   parts_.push_back({physics->AddBody(rigid, pose), rigid});
@@ -90,7 +93,9 @@ btVector3 Spiri::WantedVelocity(double time) {
     altitude_ = std::min(altitude_ + parameters_.take_off_speed * Physics::kStep, target);
     flying_ = std::abs(place.z() - target) < kTakenOff && std::abs(speed.z()) < kTakenOff;
   }
-  if (flying_ && command_) {
+  if (landing_) {
+    Land(place, speed);
+  } else if (flying_ && command_) {
     const btMatrix3x3 yaw(btQuaternion(btVector3(0, 0, 1), btScalar(Heading(pose.getBasis()))));
     wanted = yaw * command_->velocity;
     altitude_ += command_->velocity.z() * Physics::kStep;
@@ -108,6 +113,16 @@ btVector3 Spiri::WantedVelocity(double time) {
       std::clamp<double>(altitude_, place.z() - kMaxAltitudeError, place.z() + kMaxAltitudeError);
   wanted.setZ(wanted.z() + btScalar(parameters_.position_p * (altitude_ - place.z())));
   return wanted;
+}
+
+// Sinks where it is; when it has pushed down for a while and does not sink any more, it stands.
+void Spiri::Land(const btVector3& place, const btVector3& speed) {
+  if (!hold_) hold_ = place;
+  altitude_ -= parameters_.take_off_speed * Physics::kStep;
+  const bool stands =
+      altitude_ < place.z() - 0.8 * kMaxAltitudeError && std::abs(speed.z()) < kTakenOff;
+  standing_ = stands ? standing_ + Physics::kStep : 0.0;
+  landed_ = landed_ || standing_ > kStanding;
 }
 
 btVector3 Spiri::WantedForce(const btVector3& wanted_velocity) {
@@ -164,18 +179,42 @@ void Spiri::DriveRotors(double thrust, const btVector3& torque) {
   }
 }
 
+double Spiri::GroundEffect() const {
+  const double radius = parameters_.rotor_radius;
+  const double range = kGroundEffectReach * radius;
+  const btTransform pose = body().Pose();
+  const double height =
+      physics_->CastRay(pose.getOrigin(), -pose.getBasis().getColumn(2), range, body().rigid);
+  if (height >= range) return 1;
+  const double ratio = radius / (4 * std::max(height, radius / 2));
+  return 1 / (1 - ratio * ratio);
+}
+
+// Momentum theory: a rotor of area A that pushes with T takes at least T^1.5 / sqrt(2 rho A).
+double Spiri::Power() const {
+  const double area = M_PI * parameters_.rotor_radius * parameters_.rotor_radius;
+  double ideal = 0;
+  for (const double speed : rotor_speeds_) {
+    const double thrust = parameters_.motor_constant * speed * speed;
+    ideal += thrust * std::sqrt(thrust / (2 * kAirDensity * area));
+  }
+  return parameters_.electronics_power + ideal / parameters_.rotor_efficiency;
+}
+
 void Spiri::ApplyForces() {
   const double lever = parameters_.arm / std::sqrt(2.0);
+  const double ground_effect = GroundEffect();
   btVector3 force(0, 0, 0), torque(0, 0, 0);
   for (size_t r = 0; r < rotor_speeds_.size(); ++r) {
-    const double thrust = parameters_.motor_constant * rotor_speeds_[r] * rotor_speeds_[r];
+    const double thrust =
+        ground_effect * parameters_.motor_constant * rotor_speeds_[r] * rotor_speeds_[r];
     force += btVector3(0, 0, btScalar(thrust));
     torque +=
         btVector3(btScalar(kAlongY[r] * lever * thrust), btScalar(-kAlongX[r] * lever * thrust),
                   btScalar(kSpin[r] * parameters_.moment_constant * thrust));
   }
   const btMatrix3x3& attitude = body().rigid->getWorldTransform().getBasis();
-  const btVector3 air = attitude.transpose() * body().Velocity();
+  const btVector3 air = attitude.transpose() * (body().Velocity() - physics_->wind());
   const btVector3 rates = attitude.transpose() * body().AngularVelocity();
   const btVector3 drag(btScalar(parameters_.drag_xy), btScalar(parameters_.drag_xy),
                        btScalar(parameters_.drag_z));
@@ -200,11 +239,17 @@ void Spiri::Actuate(double time) {
       std::clamp(Wrap(heading_ - heading), -kMaxHeadingError, kMaxHeadingError);
   heading_ = heading + heading_error;
   const double yaw_rate =
-      (flying_ && command_ ? command_->yaw_rate : 0.0) + parameters_.heading_p * heading_error;
+      (ready() && command_ ? command_->yaw_rate : 0.0) + parameters_.heading_p * heading_error;
 
   const btVector3 force = WantedForce(wanted_velocity);
   const btVector3 up = body().rigid->getWorldTransform().getBasis().getColumn(2);
-  DriveRotors(std::max<double>(0, force.dot(up)), WantedTorque(force, yaw_rate));
+  if (landed_ || battery_.charge() <= 0) {
+    DriveRotors(0, btVector3(0, 0, 0));
+  } else {
+    DriveRotors(std::max<double>(0, force.dot(up)), WantedTorque(force, yaw_rate));
+  }
+  battery_.Drain(Power(), Physics::kStep);
+  landing_ = landing_ || battery_.charge() <= parameters_.reserve;
   ApplyForces();
 }
 

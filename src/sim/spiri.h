@@ -36,7 +36,12 @@ struct SpiriParameters {
   double max_yaw_rate = 2.0;           ///< [rad/s]
   double command_timeout = 0.3;        ///< Hover if no command came for so long [s].
   double take_off_altitude = 0.65;     ///< Of the body's origin; here above the world's z = 0 [m].
-  double take_off_speed = 0.5;         ///< [m/s]
+  double take_off_speed = 0.5;         ///< Also of the landing [m/s].
+  double rotor_radius = 0.1;           ///< [m]
+  double rotor_efficiency = 0.5;       ///< Ideal power of a rotor over the power that it takes.
+  double electronics_power = 6.0;      ///< Of all but the rotors [W].
+  double reserve = 0.1;                ///< Share of the battery's charge at which it lands.
+  BatteryParameters battery;
 };
 
 /// The drone: one rigid body, four rotors with lag, drag, and the controller that turns a velocity
@@ -44,8 +49,11 @@ struct SpiriParameters {
 ///
 /// The cascade has hector_quadrotor's form: velocity PI in the yaw frame -> acceleration -> tilt
 /// (limited) and thrust -> attitude PD -> rotors. It takes off by itself unless it starts that
-/// high, then obeys commands and holds its place when there are none. Its own state feeds it, as in
-/// the thesis' simulator.
+/// high, then obeys commands and holds its place when there are none; it lands by itself on the
+/// last of its battery. Its own state feeds it, as in the thesis' simulator.
+///
+/// Rotors push harder near the ground (Cheeseman & Bennett 1955, ARC R&M 3021): by
+/// 1 / (1 - (R / 4z)^2) at a height of z, but never more than at z = R / 2.
 class Spiri : public MobileRobot {
  public:
   /// `pose` is where the root link of `robot`, which must outlive this object, starts. Throws
@@ -60,9 +68,10 @@ class Spiri : public MobileRobot {
 
   /// The state that its controller flies by: without error.
   OdometrySample Odometry() const override;
+  const Battery* battery() const override { return &battery_; }
   bool flies() const override { return true; }
-  /// Take-off is complete.
-  bool ready() const override { return flying_; }
+  /// Take-off is complete, landing has not begun.
+  bool ready() const override { return flying_ && !landing_; }
   const std::array<double, 4>& rotor_speeds() const { return rotor_speeds_; }
 
  private:
@@ -77,14 +86,21 @@ class Spiri : public MobileRobot {
   btVector3 WantedTorque(const btVector3& wanted_force, double wanted_yaw_rate) const;
   void DriveRotors(double thrust, const btVector3& torque);
   void ApplyForces();
+  double GroundEffect() const;
+  double Power() const;
+  void Land(const btVector3& place, const btVector3& speed);
 
   SpiriParameters parameters_;
+  const Physics* physics_;
   btTransform start_;
+  Battery battery_;
   double mass_;
   btVector3 inertia_;
   double gravity_;
   std::optional<Setpoint> command_;
   bool flying_ = false;
+  bool landing_ = false, landed_ = false;
+  double standing_ = 0;            // How long it stands on the ground after a flight [s].
   std::optional<btVector3> hold_;  // The place that is held while there is no command.
   double altitude_;                // Altitude that is held, moved by vertical commands.
   double heading_;                 // The same for yaw.

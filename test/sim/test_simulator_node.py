@@ -11,10 +11,11 @@ import numpy as np
 import rospy
 import rostest
 import yaml
-from geometry_msgs.msg import Twist
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock, Log
-from sensor_msgs.msg import CameraInfo, Image, Imu, JointState, Range
+from sensor_msgs.msg import BatteryState, CameraInfo, Image, Imu, JointState, Range
 from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 
@@ -37,6 +38,8 @@ TOPICS = {
     "/tf": TFMessage,
     "/tf_static": TFMessage,
     "/gazebo/truth": Truth,
+    "/spiri/battery_state": BatteryState,
+    "/diagnostics": DiagnosticArray,
 }
 DEADLINE = 20.0  # Wall-clock seconds; only a fault reaches it.
 
@@ -146,6 +149,34 @@ class SimulatorNodeTest(unittest.TestCase):
         self.assertAlmostEqual(truth.drone_pose.position.z, self.got["/range"][-1].range, delta=0.06)
         state = self.got["/spiri/odometry"][-1].pose.pose.position
         self.assertAlmostEqual(state.z + 0.04, truth.drone_pose.position.z, delta=0.03)
+
+    def test_tells_of_its_battery_and_its_pace_every_second(self):
+        self.step(95)
+        wait_for(lambda: len(self.got["/spiri/battery_state"]) >= 3, "the battery's state")
+        wait_for(lambda: len(self.got["/diagnostics"]) >= 3, "diagnostics")
+        battery = self.got["/spiri/battery_state"][2]
+        self.assertEqual(battery.header.stamp.to_nsec(), 3_000_000_000)
+        self.assertAlmostEqual(battery.percentage, 1.0, delta=0.01)
+        self.assertAlmostEqual(battery.charge, 1.3 * battery.percentage, delta=1e-3)
+        self.assertLess(battery.current, -1.0)
+        self.assertLess(battery.voltage, 12.6)
+        status = {status.name: status for status in self.got["/diagnostics"][2].status}
+        self.assertEqual(set(status), {"gazebo: pace", "gazebo: battery"})
+        pace = {value.key: value.value for value in status["gazebo: pace"].values}
+        self.assertEqual(pace["frames"], "90")
+        self.assertEqual(pace["skipped frames"], "0")
+        self.assertGreater(float(pace["real-time factor"]), 0)
+
+    def test_wind_blows_and_is_refused_if_not_finite(self):
+        self.step(150)
+        wind = rospy.Publisher("/wind", Vector3, queue_size=10, latch=True)
+        wind.publish(Vector3(0, 2, 0))
+        wait_for(lambda: wind.get_num_connections(), "/wind connected")
+        time.sleep(0.2)
+        wind.publish(Vector3(0, float("nan"), 0))  # Leaves it as it was.
+        self.step(60)
+        self.assertGreater(self.got["/gazebo/truth"][-1].drone_pose.position.y, 0.1)
+        wind.unregister()
 
     def test_step_is_refused_while_running(self):
         self.call["unpause_physics"]()
