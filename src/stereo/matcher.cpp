@@ -16,23 +16,27 @@ void Matcher::SetParameters(const MatcherParameters& parameters) {
   if (p.correlation_window_size < 5 || p.disparity_range < 16) {
     throw std::invalid_argument("correlation_window_size must be at least 5, disparity_range 16");
   }
-  if (p.algorithm == Algorithm::kSemiGlobal) {
-    matcher_ = cv::StereoSGBM::create(
-        p.min_disparity, p.disparity_range, p.correlation_window_size, static_cast<int>(p.p1),
-        static_cast<int>(p.p2), p.disp12_max_diff, p.prefilter_cap,
-        static_cast<int>(p.uniqueness_ratio), p.speckle_size, p.speckle_range,
-        p.full_dp ? cv::StereoSGBM::MODE_HH : cv::StereoSGBM::MODE_SGBM);
-  } else {
-    const auto matcher = cv::StereoBM::create(p.disparity_range, p.correlation_window_size);
-    matcher->setMinDisparity(p.min_disparity);
-    matcher->setPreFilterCap(p.prefilter_cap);
-    matcher->setUniquenessRatio(static_cast<int>(p.uniqueness_ratio));
-    matcher->setTextureThreshold(p.texture_threshold);
-    matcher->setSpeckleWindowSize(p.speckle_size);
-    matcher->setSpeckleRange(p.speckle_range);
-    matcher_ = matcher;
-  }
+  semi_global_matcher_ = cv::StereoSGBM::create(
+      p.min_disparity, p.disparity_range, p.correlation_window_size, static_cast<int>(p.p1),
+      static_cast<int>(p.p2), p.disp12_max_diff, p.prefilter_cap,
+      static_cast<int>(p.uniqueness_ratio), p.speckle_size, p.speckle_range,
+      p.full_dp ? cv::StereoSGBM::MODE_HH : cv::StereoSGBM::MODE_SGBM);
   parameters_ = p;
+}
+
+void Matcher::MatchBlocks(const cv::Mat& left, const cv::Mat& right) {
+  BlockMatcherParameters p;
+  p.prefilter_cap = parameters_.prefilter_cap;
+  p.window = parameters_.correlation_window_size;
+  p.min_disparity = parameters_.min_disparity;
+  p.range = parameters_.disparity_range;
+  p.uniqueness_ratio = static_cast<int>(parameters_.uniqueness_ratio);
+  p.texture_threshold = parameters_.texture_threshold;
+  block_matcher_.Match(left, right, p, &disparity_);
+  if (parameters_.speckle_size > 0) {
+    cv::filterSpeckles(disparity_, Invalid(), parameters_.speckle_size, parameters_.speckle_range,
+                       speckle_buffer_);
+  }
 }
 
 const cv::Mat& Matcher::Match(const cv::Mat& left, const cv::Mat& right) {
@@ -51,7 +55,11 @@ const cv::Mat& Matcher::Match(const cv::Mat& left, const cv::Mat& right) {
          << parameters_.correlation_window_size;
     throw std::invalid_argument(text.str());
   }
-  matcher_->compute(left, right, disparity_);
+  if (parameters_.algorithm == Algorithm::kSemiGlobal) {
+    semi_global_matcher_->compute(left, right, disparity_);
+  } else {
+    MatchBlocks(left, right);
+  }
   return disparity_;
 }
 

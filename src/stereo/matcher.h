@@ -5,6 +5,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
+#include "stereo/block_matcher.h"
+
 namespace tld_follower::stereo {
 
 /// Disparities are fixed-point numbers with this many steps a pixel.
@@ -52,9 +54,12 @@ class Matcher {
   cv::Rect ValidWindow(cv::Size image) const;
 
  private:
+  void MatchBlocks(const cv::Mat& left, const cv::Mat& right);
+
   MatcherParameters parameters_;
-  cv::Ptr<cv::StereoMatcher> matcher_;
-  cv::Mat disparity_;
+  BlockMatcher block_matcher_;
+  cv::Ptr<cv::StereoSGBM> semi_global_matcher_;
+  cv::Mat disparity_, speckle_buffer_;
 };
 
 /// Fills `pixels` (CV_32FC1) with the disparity [pixel], with the cameras' `offset` taken off as

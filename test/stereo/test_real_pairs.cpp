@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
@@ -19,6 +20,45 @@ struct Pair {
   double max_off;      // Of the matched pixels, the share off by more than 1 pixel.
   double min_matched;  // Of the pixels whose truth is known.
 };
+
+struct Score {
+  double off = 0, matched = 0;  // As Pair bounds them.
+};
+
+Score Compare(const cv::Mat& disparity, int invalid, const cv::Mat& truth) {
+  int known = 0, matched = 0, off = 0;
+  for (int v = 0; v < truth.rows; ++v) {
+    for (int u = 0; u < truth.cols; ++u) {
+      const float d = truth.at<float>(v, u);
+      if (!(d > 0)) continue;
+      ++known;
+      const int fixed = disparity.at<int16_t>(v, u);
+      if (fixed == invalid) continue;
+      ++matched;
+      off += std::abs(static_cast<float>(fixed) / kSteps - d) > 1;
+    }
+  }
+  return {static_cast<double>(off) / matched, static_cast<double>(matched) / known};
+}
+
+// What stereo_image_proc asks OpenCV for.
+cv::Ptr<cv::StereoMatcher> MakePeer(const MatcherParameters& p) {
+  if (p.algorithm == Algorithm::kSemiGlobal) {
+    return cv::StereoSGBM::create(p.min_disparity, p.disparity_range, p.correlation_window_size,
+                                  static_cast<int>(p.p1), static_cast<int>(p.p2), p.disp12_max_diff,
+                                  p.prefilter_cap, static_cast<int>(p.uniqueness_ratio),
+                                  p.speckle_size, p.speckle_range);
+  }
+  const auto peer = cv::StereoBM::create(p.disparity_range, p.correlation_window_size);
+  peer->setMinDisparity(p.min_disparity);
+  peer->setPreFilterSize(9);
+  peer->setPreFilterCap(p.prefilter_cap);
+  peer->setUniquenessRatio(static_cast<int>(p.uniqueness_ratio));
+  peer->setTextureThreshold(p.texture_threshold);
+  peer->setSpeckleWindowSize(p.speckle_size);
+  peer->setSpeckleRange(p.speckle_range);
+  return peer;
+}
 
 void Check(const Pair& pair, Algorithm algorithm) {
   const char* data = std::getenv("TLD_FOLLOWER_DATA");
@@ -35,25 +75,17 @@ void Check(const Pair& pair, Algorithm algorithm) {
   parameters.algorithm = algorithm;
   parameters.disparity_range = pair.range;
   Matcher matcher(parameters);
-  const cv::Mat& disparity = matcher.Match(left, right);
-  int known = 0, matched = 0, off = 0;
-  for (int v = 0; v < left.rows; ++v) {
-    for (int u = 0; u < left.cols; ++u) {
-      const float d = expected.at<float>(v, u);
-      if (!(d > 0)) continue;
-      ++known;
-      const int fixed = disparity.at<int16_t>(v, u);
-      if (fixed == matcher.Invalid()) continue;
-      ++matched;
-      off += std::abs(static_cast<float>(fixed) / kSteps - d) > 1;
-    }
-  }
-  const double share_off = static_cast<double>(off) / matched;
-  const double share_matched = static_cast<double>(matched) / known;
-  std::printf("%s: matched %.3f, of these off by more than 1 pixel %.4f\n", pair.left,
-              share_matched, share_off);
-  EXPECT_LT(share_off, pair.max_off);
-  EXPECT_GT(share_matched, pair.min_matched);
+  const Score ours = Compare(matcher.Match(left, right), matcher.Invalid(), expected);
+  cv::Mat disparity;
+  MakePeer(parameters)->compute(left, right, disparity);
+  const Score peers = Compare(disparity, matcher.Invalid(), expected);
+  std::printf(
+      "%s: matched %.3f, of these off by more than 1 pixel %.4f; stereo_image_proc %.3f, %.4f\n",
+      pair.left, ours.matched, ours.off, peers.matched, peers.off);
+  EXPECT_LT(ours.off, pair.max_off);
+  EXPECT_GT(ours.matched, pair.min_matched);
+  EXPECT_LE(ours.off, peers.off);
+  EXPECT_GE(ours.matched, peers.matched);
 }
 
 const Pair kAloe{"aloe/aloeL.jpg", "aloe/aloeR.jpg", "aloe/aloeGT.png", 256, 0, 0};
