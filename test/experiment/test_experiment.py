@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from tld_follower.evaluation import sequences
-from tld_follower.evaluation.fastboard import FASTBOARD, FRAMES
+from tld_follower.evaluation.fastboard import FRAMES, fastboard
 from tld_follower.evaluation.shooting import shoot
+from tld_follower.following.parameters import Parameters
 
 EXPERIMENT = Path(__file__).resolve().parents[2] / "scripts" / "experiment"
 
@@ -45,7 +46,12 @@ def test_two_lockstep_runs_give_identical_traces(results):
 
 def test_settings_and_figures_are_in_the_json(results):
     _, result, _ = results
-    expected = {"scenario": "straight", "distance": "stereo", "control": "thesis", "resolution": "320x240"}
+    expected = {
+        "scenario": "straight",
+        "distance": "stereo",
+        "control": Parameters.control,
+        "resolution": "320x240",
+    }
     assert {name: result[name] for name in expected} == expected
     (run,) = result["runs"]
     assert run["seed"] == 3
@@ -57,19 +63,24 @@ def test_settings_and_figures_are_in_the_json(results):
 
 def test_plots_and_video_are_written(results):
     report = results[0] / "report"
-    for name in ("distance.png", "velocity.png"):
+    for name in ("distance_stereo.png", "velocity_stereo.png", "path_stereo.png"):
         assert cv2.imread(str(report / name)).shape[1] > 600
-    video = cv2.VideoCapture(str(report / "left_camera.webm"))
+    page = (report / "report.html").read_text()
+    assert "overshoot below 5 cm" in page
+    assert "left_camera_stereo.webm" in page
+    assert page.count("data:image/png;base64,") == 3
+    assert "http" not in page
+    video = cv2.VideoCapture(str(report / "left_camera_stereo.webm"))
     assert video.get(cv2.CAP_PROP_FRAME_WIDTH) == 320
     assert video.read()[0]
 
 
 def test_with_depth_the_target_is_followed_past_what_passes_before_it(tmp_path):
     path = tmp_path / "occlusion.json"
-    done = run("occlusion", "--use-depth", "--first-seed", 1, "--resolution", "320x240", "--json", path)
+    done = run("occlusion", "--use-depth", "--first-seed", 2, "--resolution", "320x240", "--json", path)
     assert done.returncode == 0, done.stderr
     result = json.loads(path.read_text())
-    assert (result["use_depth"], result["world"]) == (True, "occlusion.world")
+    assert (result["use_depth"], result["world"]) == (True, "empty.world")
     (flight,) = result["runs"]
     assert flight["visible_fraction"] < 0.95  # the target was hidden
     assert flight["tracked_fraction"] > 0.85
@@ -86,7 +97,7 @@ def films(tmp_path_factory):
     size, scores = "320x240", folder / "flight.json"
     done = run("fastboard", "--resolution", size, "--film", folder / "graph", "--json", scores)
     assert done.returncode == 0, done.stderr
-    shoot(FASTBOARD, [0], folder / "alone", size)
+    shoot(fastboard, [0], folder / "alone", size)
     return folder / "graph" / "fastboard-0", folder / "alone" / "fastboard-0", json.loads(scores.read_text())
 
 

@@ -8,17 +8,18 @@ import rospy
 
 from tld_follower.evaluation.flight import Flight
 from tld_follower.evaluation.metrics import flight_figures
-from tld_follower.evaluation.scenarios import STRAIGHT
+from tld_follower.evaluation.scenarios import straight
 from tld_follower.msg import FollowState
 
 
 class StraightTest(unittest.TestCase):
     def test_follows_all_the_way(self):
         rospy.init_node("straight_test")
-        flight = Flight(STRAIGHT, seed=0)
+        plan = straight(0)
+        flight = Flight(plan)
         flight.wait_until_connected()
         trace, _ = flight.fly()
-        figures = flight_figures(trace, STRAIGHT.halt - STRAIGHT.start)
+        figures = flight_figures(trace, plan.drive_s, plan.figures)
         rospy.loginfo("%s", figures)
 
         travelled = trace["drone_position"][-1][0] - trace["drone_position"][0][0]

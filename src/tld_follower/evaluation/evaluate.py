@@ -93,11 +93,11 @@ def run_all(chosen: list[sequences.Sequence], trackers: list[Parameters], seed: 
 def film_fastboard(arguments: argparse.Namespace) -> list[sequences.Sequence]:
     """Film the scenario fastboard for the report."""
     # Only here the ROS graph is needed.
-    from tld_follower.evaluation.fastboard import FASTBOARD
+    from tld_follower.evaluation.fastboard import fastboard
     from tld_follower.evaluation.shooting import shoot
 
     _tell(f"evaluate: filming fastboard, {arguments.fastboard} films")
-    folders = shoot(FASTBOARD, range(arguments.fastboard), arguments.report / "fastboard")
+    folders = shoot(fastboard, range(arguments.fastboard), arguments.report / "fastboard")
     return [sequences.load(folder) for folder in folders]
 
 

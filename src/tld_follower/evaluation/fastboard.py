@@ -7,11 +7,10 @@ published. Drone and target move on a script, so that every tracker is shown the
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
-from tld_follower.evaluation.scenarios import Scenario
+from tld_follower.evaluation.plan import Leg, Plan, Pose
 
 RATE = 30.0  # frames a second
 FRAMES = 265
@@ -27,6 +26,8 @@ _GONE, _AWAY = 0.68, 0.86
 _EXIT, _PAN = 1.0, 0.72
 # By this much the bearing is ahead of the script at the first exit: the drone gets under way late [rad].
 _AHEAD = 0.03
+# When all begins to move, and when the target is boxed [s].
+_START, _SHOWN_AT = 3.0, 4.2
 # The pan is smoothed over this time [s].
 _SMOOTH = 0.4
 # How the yaw rate r answers its command c: r' = P (c - r) - D r |r|, P from config/spiri.yaml, D the drag
@@ -114,44 +115,38 @@ class Script:
 
 
 @dataclass(frozen=True)
-class Fastboard(Scenario):
-    """A scenario in which the drone is flown by a script, too."""
+class ScriptedPlan(Plan):
+    """A plan in which the drone is flown by a script, too; times count as in `Plan`."""
+
+    script: Script | None = None
 
     scripted = True
 
-    @staticmethod
-    @lru_cache
-    def script(seed):
-        """Return the motions of a seed."""
-        return Script(seed)
-
-    def target_command(self, t, seed):
-        """Speed in m/s and turn rate in rad/s that Husky is commanded at time `t`: a circle."""
-        script = self.script(seed)
-        return (script.speed, script.turn_rate) if t >= self.start else (0.0, 0.0)
-
-    def drone_command(self, t, seed):
-        """Velocity forward and left in m/s and yaw rate in rad/s that the drone is commanded at time `t`."""
+    def drone_command(self, t):
+        """Velocity forward, left and up in m/s and yaw rate in rad/s that the drone is commanded at `t`."""
         if t < self.start:
-            return 0.0, 0.0, 0.0
-        script, t = self.script(seed), t - self.box_at
+            return 0.0, 0.0, 0.0, 0.0
+        script, t = self.script, t - _SHOWN_AT
         before, yaw, after = (script.drone_yaw(t + i / RATE) for i in range(3))
         rate, acceleration = (after - before) * 0.5 * RATE, (after - 2.0 * yaw + before) * RATE**2
         turn = rate + (acceleration + _YAW_DRAG * rate * abs(rate)) / _YAW_P
         cos, sin = math.cos(yaw), math.sin(yaw)
         x, y = script.drone_velocity(t + _LAG)
-        return cos * x + sin * y, cos * y - sin * x, turn
-
-    def spiri_pose(self, seed):
-        """Start pose x, y in m and yaw in rad."""
-        script, t = self.script(seed), self.start - self.box_at
-        return *script.drone_place(t), script.drone_yaw(t)
-
-    def husky_pose(self, seed):
-        """Start pose x, y in m and yaw in rad."""
-        return self.script(seed).target_pose(self.start - self.box_at)
+        return cos * x + sin * y, cos * y - sin * x, 0.0, turn
 
 
-FASTBOARD = Fastboard(
-    "fastboard", box_at=4.2, start=3.0, halt=4.2 + FRAMES / RATE, end=4.2 + (FRAMES - 1) / RATE, drive=()
-)
+def fastboard(seed):
+    """Move target and drone on a script, after the thesis' sequence: the target drives a circle."""
+    script, begins = Script(seed), _START - _SHOWN_AT
+    return ScriptedPlan(
+        "fastboard",
+        Pose(*script.drone_place(begins), script.drone_yaw(begins)),
+        Pose(*script.target_pose(begins)),
+        (Leg(_SHOWN_AT - _START + (FRAMES - 1) / RATE, script.speed, script.turn_rate),),
+        frozenset(),
+        box_at=_SHOWN_AT,
+        start=_START,
+        rest=0.0,
+        world="testing_grounds.world",
+        script=script,
+    )

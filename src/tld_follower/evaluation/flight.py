@@ -1,4 +1,4 @@
-"""Flies one scenario on a running graph in lockstep: drives the target, boxes it, keeps the trace."""
+"""Flies one plan on a running graph in lockstep: drives the target, boxes it, keeps the trace."""
 
 import math
 import threading
@@ -7,7 +7,7 @@ import time
 import rospy
 from sensor_msgs.msg import RegionOfInterest
 
-from tld_follower.evaluation.graph import COMMAND_EDGE, DEPTH_EDGE, FLYING_EDGES, GraphError
+from tld_follower.evaluation.graph import COMMAND_EDGE, FLYING_EDGES, GraphError
 from tld_follower.evaluation.stage import FRAME_TIMEOUT, Stage
 from tld_follower.nodes.conversions import message_box
 
@@ -17,23 +17,35 @@ def _known(value):
     return None if math.isnan(value) else value
 
 
+def _vector(message):
+    return [message.x, message.y, message.z]
+
+
+def _attitude(q):
+    """Return roll, pitch and yaw of a quaternion message in rad (REP-103)."""
+    return [
+        math.atan2(2 * (q.w * q.x + q.y * q.z), 1 - 2 * (q.x**2 + q.y**2)),
+        math.asin(max(-1.0, min(1.0, 2 * (q.w * q.y - q.z * q.x)))),
+        math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2)),
+    ]
+
+
 class Flight:
-    """A scenario on the whole graph: the target is boxed, and every frame from then on is recorded.
+    """A plan on the whole graph: the target is boxed, and every frame from then on is recorded.
 
     Parameters
     ----------
-    scenario : Scenario
-    seed : int
+    plan : Plan
     watchers : sequence of callables
         Called with every frame (messages truth, box, state and image) and its time since the start of the
         drive in s, from the frame on in which the target is boxed.
     """
 
-    def __init__(self, scenario, seed, watchers=()):
-        self._scenario = scenario
+    def __init__(self, plan, watchers=()):
+        self._plan = plan
         self._watchers = watchers
         self._stage = Stage(
-            scenario, seed, ("truth", "box", "state", "image") if watchers else ("truth", "box", "state")
+            plan, ("truth", "box", "state", "image") if watchers else ("truth", "box", "state")
         )
         self._changed = threading.Condition()
         self._targets = 0
@@ -51,15 +63,18 @@ class Flight:
             self._targets += 1
             self._changed.notify_all()
 
-    def wait_until_connected(self, alive=lambda: None, use_depth=False):
-        """Wait for every edge of the graph, the tracker's clouds with `use_depth`, and this flight's own."""
+    def wait_until_connected(self, alive=lambda: None, more=()):
+        """Wait for every edge of the graph, those it has `more` by its settings, and this flight's own."""
         me = rospy.get_name()
-        edges = FLYING_EDGES - {COMMAND_EDGE} if self._scenario.scripted else FLYING_EDGES
-        edges |= {(me, "/NODE/init", "/NODE"), ("/NODE", "/NODE/target", me)}
-        self._stage.wait_until_connected(edges | {DEPTH_EDGE} if use_depth else edges, alive)
+        edges = set(FLYING_EDGES) | {(me, "/NODE/init", "/NODE"), ("/NODE", "/NODE/target", me), *more}
+        if self._plan.scripted:
+            edges.remove(COMMAND_EDGE)
+        if self._plan.target_robot != "husky":
+            edges = {edge for edge in edges if not edge[1].startswith("/husky/")}
+        self._stage.wait_until_connected(edges, alive)
 
     def fly(self, alive=lambda: None):
-        """Fly the scenario from the simulation's start.
+        """Fly the plan from the simulation's start.
 
         Parameters
         ----------
@@ -77,16 +92,16 @@ class Flight:
         boxed_at = None
         for t, frame in self._stage.frames(alive):
             if boxed_at is not None:
-                self._record(trace, t - self._scenario.start, frame)
-            elif t >= self._scenario.box_at:
+                self._record(trace, t - self._plan.start, frame)
+            elif t >= self._plan.box_at:
                 self._box_target(frame["truth"], alive)
                 boxed_at, began = t, time.monotonic()
-                if not self._scenario.scripted:
+                if not self._plan.scripted:
                     self._stage.run_ahead()
             else:
                 continue
             for watch in self._watchers:
-                watch(frame, t - self._scenario.start)
+                watch(frame, t - self._plan.start)
         return trace, (t - boxed_at) / (time.monotonic() - began)
 
     def _box_target(self, truth, alive):
@@ -113,7 +128,8 @@ class Flight:
         """Add a frame: truth (m, m/s in world axes), what was found, and what was commanded (yaw frame)."""
         truth, state = frame["truth"], frame["state"]
         true_box, found_box = message_box(truth.target_box), message_box(frame["box"])
-        command, drone, target = state.command, truth.drone_twist.linear, truth.target_twist.linear
+        command, drone, target = state.command, truth.drone_pose, truth.target_pose
+        estimate = [_known(getattr(state.target_velocity, axis)) for axis in "xyz"]
         entry = {
             "t": round(t, 6),
             "distance": truth.distance,
@@ -121,11 +137,16 @@ class Flight:
             "nearest_obstacle": _known(state.nearest_obstacle),
             "clearance": truth.clearance,
             "collisions": truth.collisions,
-            "drone_position": [getattr(truth.drone_pose.position, axis) for axis in "xyz"],
-            "drone_velocity": [drone.x, drone.y, drone.z],
-            "target_velocity": [target.x, target.y, target.z],
-            "command": [command.linear.x, command.linear.y, command.linear.z, command.angular.z],
+            "drone_position": _vector(drone.position),
+            "drone_attitude": _attitude(drone.orientation),
+            "drone_velocity": _vector(truth.drone_twist.linear),
+            "target_position": _vector(target.position),
+            "target_yaw": _attitude(target.orientation)[2],
+            "target_velocity": _vector(truth.target_twist.linear),
+            "estimated_velocity": None if None in estimate else estimate,
+            "command": [*_vector(command.linear), command.angular.z],
             "mode": state.mode,
+            "reason": state.reason,
             "in_view": true_box is not None,
             "box_visible": found_box is not None,
             "overlap": true_box.overlap(found_box) if true_box and found_box else 0.0,

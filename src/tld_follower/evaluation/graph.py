@@ -32,8 +32,9 @@ FLYING_EDGES = frozenset(
 )
 # The one that a scenario does without when a script flies the drone.
 COMMAND_EDGE = ("/pointsdepthA", "/cmd_vel", "/gazebo")
-# The one more with use_depth.
+# The ones more with use_depth and with use_right_camera.
 DEPTH_EDGE = ("/stereo/stereo_image_proc", "/stereo/points2", "/NODE")
+RIGHT_EDGE = ("/gazebo", "/stereo/right/image_raw", "/NODE")
 
 
 class GraphError(RuntimeError):

@@ -7,17 +7,31 @@ from tld_follower.evaluation.scoring import recoveries
 SET_DISTANCE = 1.0  # m
 TRACKED_OVERLAP = 0.25
 SETTLED = 0.05  # m
+LOST_S = 0.3  # s without the target from which on it counts as lost; the follower trusts nothing older
+RECOVERED_S = 10.0
 FOLLOWING = ("peak_gap_m", "steady_error_m", "rmse_m", "overshoot_m", "settle_s")
+# Figures of which less is worse; of the others more is.
+_MORE_IS_BETTER = frozenset(
+    {
+        *("min_clearance_m", "visible_fraction", "tracked_fraction", "mean_overlap", "real_time_factor"),
+        *("reentries", "reentries_found", "recoveries"),
+    }
+)
 
 
 def _between(t, first, last):
     return (t >= first) & (t < last)
 
 
-def _episodes(visible):
-    """Find where runs of False begin after a True, and where each ends again (None: never)."""
-    lost = [i for i in range(1, len(visible)) if visible[i - 1] and not visible[i]]
-    return [(i, next((j for j in range(i, len(visible)) if visible[j]), None)) for i in lost]
+def _losses(t, tracked):
+    """Return how long the target was lost each time, in s, and whether it still is at the end."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], tracked, [True]])))
+    begins, ends = edges[::2], edges[1::2]
+    # A frame lasts until the next one; the last one as long as the one before it.
+    until = np.append(t, 2 * t[-1] - t[-2])
+    times = until[ends] - until[begins]
+    long = times >= LOST_S - 1e-6
+    return times[long], bool(long.size and long[-1] and ends[-1] == len(t))
 
 
 def _following(t, distance, drive_s):
@@ -40,7 +54,7 @@ def _following(t, distance, drive_s):
     return dict(zip(FOLLOWING, values, strict=True))
 
 
-def flight_figures(trace, drive_s):
+def flight_figures(trace, drive_s, wanted):
     """Compute the figures of one flight.
 
     Parameters
@@ -48,13 +62,14 @@ def flight_figures(trace, drive_s):
     trace : dict of lists, one entry a frame from the boxing of the target on
         t (s, 0 when the target starts to drive), distance (m), clearance (m), collisions (count so far),
         in_view (target has visible pixels), box_visible, overlap (of found and true box, 0 without a box).
-    drive_s : float or None
-        How long the target drives while the drone follows it, seconds; None if a script flies the drone.
+    drive_s : float
+        How long the target drives, seconds.
+    wanted : collection of str
+        Which of the figures of following, and whether recovered_10s, make sense; the others are None.
 
     Returns
     -------
     dict
-        None of each of the first five if a script flies the drone.
         peak_gap_m: largest distance over the set distance, from the start to the halt;
         steady_error_m: mean |distance - set| over the last 7 s of the drive;
         rmse_m: root mean square of distance - set from 1 s after the start to 3 s after the halt;
@@ -65,20 +80,22 @@ def flight_figures(trace, drive_s):
         wrong_boxes: frames with a box that does not overlap the true one so; boxes_while_hidden: those
         of them in which no pixel of the target is in view;
         reentries, reentries_found, failures: see `scoring.recoveries`;
-        losses, recoveries: of the box; recovery_s: longest time without a box that ended, None without one.
+        losses: how often the target was lost, that is not tracked for 0.3 s and more; recoveries: how often
+        it was tracked again; recovery_s: the longest such time, from the loss on, None without one;
+        recovered_10s: whether no loss lasted longer than 10 s or until the end of the flight.
     """
     t = np.asarray(trace["t"])
     in_view, box_visible = np.asarray(trace["in_view"]), np.asarray(trace["box_visible"])
     overlaps = np.asarray(trace["overlap"])
     overlap = overlaps[in_view]
-    losses = _episodes(box_visible)
-    times = [float(t[end] - t[begin]) for begin, end in losses if end is not None]
+    following = dict.fromkeys(FOLLOWING)
+    if not following.keys().isdisjoint(wanted):
+        measured = _following(t, np.asarray(trace["distance"]), drive_s)
+        following |= {name: value for name, value in measured.items() if name in wanted}
+    times, lost = _losses(t, in_view & (overlaps > TRACKED_OVERLAP))
+    recovered = times[:-1] if lost else times
     return {
-        **(
-            dict.fromkeys(FOLLOWING)
-            if drive_s is None
-            else _following(t, np.asarray(trace["distance"]), drive_s)
-        ),
+        **following,
         "min_clearance_m": float(min(trace["clearance"])),
         "collisions": int(trace["collisions"][-1]),
         "visible_fraction": float(in_view.mean()),
@@ -87,7 +104,47 @@ def flight_figures(trace, drive_s):
         "wrong_boxes": int((box_visible & (overlaps <= TRACKED_OVERLAP)).sum()),
         "boxes_while_hidden": int((box_visible & ~in_view).sum()),
         **recoveries(in_view, overlaps),
-        "losses": len(losses),
-        "recoveries": len(times),
-        "recovery_s": max(times, default=None),
+        "losses": len(times),
+        "recoveries": len(recovered),
+        "recovery_s": float(recovered.max()) if recovered.size else None,
+        "recovered_10s": (
+            bool(not lost and (times <= RECOVERED_S + 1e-6).all()) if "recovered_10s" in wanted else None
+        ),
+    }
+
+
+def summary(runs):
+    """Sum up the runs of several seeds.
+
+    Parameters
+    ----------
+    runs : list of dict
+        As `flight_figures` has them; those with an "error" have none.
+
+    Returns
+    -------
+    dict
+        runs, failed: how many there are, and of those how many have an error;
+        collision_free, recovered_10s: share of the others, the latter None where it makes no sense;
+        worst, mean: figure -> value. None where no run has the figure; settle_s also where one never settled.
+    """
+    flown = [run for run in runs if "error" not in run]
+    worst, mean = {}, {}
+    for name in flown[0] if flown else ():
+        if name in ("seed", "trace", "recovered_10s"):
+            continue
+        values = [run[name] for run in flown if run[name] is not None]
+        if not values or (name == "settle_s" and len(values) < len(flown)):
+            worst[name] = mean[name] = None
+        else:
+            worst[name] = min(values) if name in _MORE_IS_BETTER else max(values)
+            mean[name] = float(np.mean(values))
+    recovered = [run["recovered_10s"] for run in flown if run["recovered_10s"] is not None]
+    return {
+        "runs": len(runs),
+        "failed": len(runs) - len(flown),
+        "collision_free": float(np.mean([run["collisions"] == 0 for run in flown])) if flown else None,
+        "recovered_10s": float(np.mean(recovered)) if recovered else None,
+        "worst": worst,
+        "mean": mean,
     }

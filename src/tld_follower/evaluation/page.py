@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import html
+from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -14,7 +15,10 @@ table { border-collapse: collapse; margin: 1em 0 }
 th, td { padding: .25em .7em; text-align: right; border-bottom: 1px solid #ddd }
 th:first-child, td:first-child { text-align: left }
 th { border-bottom: 2px solid #999; vertical-align: bottom }
-img { max-width: 100% }
+img, video { max-width: 100% }
+.row { display: flex; flex-wrap: wrap }
+.row figure { flex: 1 1 420px; margin: .5em }
+figcaption { color: #555 }
 """
 
 
@@ -27,7 +31,7 @@ def write_table(stem: Path, table: Sequence[Sequence[str]]) -> None:
 
 
 class Page:
-    """An HTML page that needs nothing but the pictures beside it."""
+    """An HTML page that needs nothing but the pictures and videos beside it."""
 
     def __init__(self, title: str):
         self._title = html.escape(title)
@@ -58,6 +62,22 @@ class Page:
         name, caption = html.escape(name), html.escape(caption)
         image = f'<img src="{name}" alt="{caption}">'
         self._parts.append(f"<figure>{image}<figcaption>{caption}</figcaption></figure>")
+
+    def figures(self, figures: Iterable[tuple[Path, str]]) -> None:
+        """Add PNG files with their captions side by side; they become part of the page."""
+        shown = "".join(
+            f'<figure><img src="data:image/png;base64,{b64encode(path.read_bytes()).decode()}" '
+            f'alt="{html.escape(caption)}"><figcaption>{html.escape(caption)}</figcaption></figure>'
+            for path, caption in figures
+        )
+        self._parts.append(f'<div class="row">{shown}</div>')
+
+    def video(self, name: str, caption: str) -> None:
+        """Add a video that lies beside the page."""
+        name, caption = html.escape(name), html.escape(caption)
+        self._parts.append(
+            f'<figure><video controls src="{name}"></video><figcaption>{caption}</figcaption></figure>'
+        )
 
     def write(self, path: Path) -> None:
         """Write the page."""

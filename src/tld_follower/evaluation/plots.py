@@ -9,6 +9,7 @@ import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.patches import Circle, Rectangle
 
 from tld_follower.evaluation.film import picture
 from tld_follower.evaluation.metrics import SET_DISTANCE
@@ -25,7 +26,7 @@ def _axes(drive_s, title, unit):
     axes.text(
         drive_s / 2,
         0.98,
-        "Husky drives",
+        "target moves",
         transform=axes.get_xaxis_transform(),
         ha="center",
         va="top",
@@ -35,6 +36,11 @@ def _axes(drive_s, title, unit):
     axes.grid(color="#dddddd", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
     return figure, axes
+
+
+def _save(figure, path):
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
 
 
 def plot_distance(runs, drive_s, title, path):
@@ -49,20 +55,75 @@ def plot_distance(runs, drive_s, title, path):
     axes.plot(trace["t"], trace["distance"], color=FOUND, linewidth=1.8, label="true distance")
     axes.set_ylim(0, max(2.0, 1.1 * max(max(run["trace"]["distance"]) for run in runs)))
     axes.legend(loc="lower right", frameon=False)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    _save(figure, path)
+
+
+def forward_velocities(trace):
+    """Return the velocities of drone and target along the drone's heading, arrays (N,) in m/s."""
+    yaw = np.array(trace["drone_attitude"])[:, 2]
+    heading = np.column_stack([np.cos(yaw), np.sin(yaw)])
+    return tuple(
+        (np.array(trace[name])[:, :2] * heading).sum(axis=1) for name in ("drone_velocity", "target_velocity")
+    )
 
 
 def plot_velocity(run, drive_s, title, path):
-    """Plot both vehicles' speed along the first line of sight (thesis figure 4.6), and the command."""
+    """Plot both vehicles' velocity along the drone's heading (thesis figure 4.6), and the command."""
     trace = run["trace"]
+    drone, target = forward_velocities(trace)
     figure, axes = _axes(drive_s, title, "forward velocity [m/s]")
     axes.plot(trace["t"], np.array(trace["command"])[:, 0], color="#9aa5ad", linewidth=0.8, label="command")
-    axes.plot(trace["t"], np.array(trace["target_velocity"])[:, 0], color=INK, linewidth=1.5, label="Husky")
-    axes.plot(trace["t"], np.array(trace["drone_velocity"])[:, 0], color=FOUND, linewidth=1.5, label="Spiri")
+    axes.plot(trace["t"], target, color=INK, linewidth=1.5, label="target")
+    axes.plot(trace["t"], drone, color=FOUND, linewidth=1.5, label="follower")
     axes.legend(loc="lower right", frameon=False)
-    figure.savefig(path, dpi=110)
-    plt.close(figure)
+    _save(figure, path)
+
+
+def plot_path(run, plan, title, path):
+    """Plot from above what the vehicles drove and flew, with a line of sight every 2 s, and the obstacles.
+
+    An obstacle that moves is drawn where it came nearest to the drone, its way dotted.
+    """
+    trace = run["trace"]
+    drone, target = (np.array(trace[name])[:, :2] for name in ("drone_position", "target_position"))
+    figure, axes = plt.subplots(figsize=(8, 6), layout="constrained")
+    for obstacle in plan.obstacles:
+        gaps = [
+            float(obstacle.distance(place, t + plan.start)[0])
+            for place, t in zip(drone[::10], trace["t"][::10], strict=True)
+        ]
+        x, y, yaw = obstacle.pose(trace["t"][10 * int(np.argmin(gaps))] + plan.start)
+        length, width, _ = obstacle.size
+        shape = (
+            Circle((x, y), 0.5 * length)
+            if obstacle.shape == "cylinder"
+            else Rectangle(
+                (x - 0.5 * length, y - 0.5 * width),
+                length,
+                width,
+                angle=np.degrees(yaw),
+                rotation_point="center",
+            )
+        )
+        shape.set(facecolor="#cbb994", edgecolor="#8a7a58")
+        axes.add_patch(shape)
+        if len(obstacle.track) > 1:
+            axes.plot(*np.array(obstacle.track)[:, 1:3].T, color="#8a7a58", linewidth=1, linestyle=":")
+    labelled = None
+    for i in range(0, len(drone), 60):
+        axes.plot(*np.stack([drone[i], target[i]]).T, color="#bbbbbb", linewidth=0.8)
+        if labelled is None or np.hypot(*(target[i] - labelled)) > 0.3:
+            labelled = target[i]
+            axes.annotate(f"{trace['t'][i]:.0f} s", labelled, fontsize=7, color=TRUTH)
+    axes.plot(*target.T, color=INK, linewidth=1.5, label="target")
+    axes.plot(*drone.T, color=FOUND, linewidth=1.5, label="follower")
+    both = np.concatenate([drone, target])
+    (left, low), (right, high) = both.min(axis=0) - 1.5, both.max(axis=0) + 1.5
+    axes.set(title=title, xlabel="x [m]", ylabel="y [m]", xlim=(left, right), ylim=(low, high))
+    axes.set_aspect("equal")
+    axes.grid(color="#dddddd", linewidth=0.6)
+    axes.legend(loc="best", frameon=False)
+    _save(figure, path)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ def shoot(scenario, seeds, directory, resolution="320x240", image_noise=1.0):
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : function of a seed that returns a Plan
         One that flies the drone by a script.
     seeds : iterable of int
     directory : Path
@@ -41,7 +41,7 @@ def shoot(scenario, seeds, directory, resolution="320x240", image_noise=1.0):
     try:
         return _shoot(scenario, seeds, directory, resolution, image_noise)
     except (graph.GraphError, rospy.ROSException, OSError) as error:
-        raise SequenceError(f"{scenario.name} cannot be filmed: {error}") from error
+        raise SequenceError(f"{scenario.__name__} cannot be filmed: {error}") from error
 
 
 def _shoot(scenario, seeds, directory, resolution, image_noise):
@@ -50,16 +50,18 @@ def _shoot(scenario, seeds, directory, resolution, image_noise):
     with graph.private_master(logs):
         rospy.init_node("films", disable_signals=True)
         for seed in seeds:
-            folders.append(directory / f"{scenario.name}-{seed}")
-            arguments = simulation_arguments(scenario, seed, resolution, image_noise)
+            plan = scenario(seed)
+            name = f"{plan.scenario}-{seed}"
+            folders.append(directory / name)
+            arguments = simulation_arguments(plan, seed, resolution, image_noise, logs)
             with (
                 closing(Film(folders[-1])) as film,
-                closing(Stage(scenario, seed, ("truth", "image"))) as stage,
-                graph.launched("sim.launch", arguments, logs / f"{scenario.name}-{seed}.log") as alive,
+                closing(Stage(plan, ("truth", "image"))) as stage,
+                graph.launched("sim.launch", arguments, logs / f"{name}.log") as alive,
             ):
                 stage.wait_until_connected(alive=alive)
                 for t, frame in stage.frames(alive):
-                    if t >= scenario.box_at:
+                    if t >= plan.box_at:
                         film.add(frame, t)
         rospy.signal_shutdown("done")
     return folders

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulation in lockstep from outside: answers every frame with the commands of a scenario's script."""
+"""The simulation in lockstep from outside: answers every frame with the commands of a plan."""
 
 import threading
 import time
@@ -10,6 +10,7 @@ from sensor_msgs.msg import Image
 from std_srvs.srv import Empty
 
 from tld_follower.evaluation.graph import GraphError, wait_for_edges, world_file
+from tld_follower.evaluation.worlds import write_world
 from tld_follower.msg import BoundingBox, FollowState, Truth
 
 # How long one frame may take before the flight is given up; lockstep itself goes on after less.
@@ -24,8 +25,35 @@ _SOURCES = {
 }
 
 
-def simulation_arguments(scenario, seed, resolution, image_noise, world=None):
-    """Arguments of sim.launch for a `Stage`; `world` is a file, the scenario's own if None."""
+# Who takes the target's commands, and the topic of a drone that a script flies.
+_DRIVE_TOPIC = {"husky": "/husky/cmd_vel", "target": "/target/cmd_vel"}
+_FLY_TOPIC = "/cmd_vel"
+
+
+def simulation_arguments(plan, seed, resolution, image_noise, folder, world=None):
+    """Arguments of sim.launch for a `Stage`.
+
+    Parameters
+    ----------
+    plan : Plan
+    seed : int
+        Of all noise.
+    resolution : str
+        WxH in pixels.
+    image_noise : float
+        Standard deviation in grey levels.
+    folder : Path
+        Gets the world of the flight, SCENARIO-SEED.world.
+    world : path or None
+        The base world; the plan's own if None.
+
+    Raises
+    ------
+    WorldError
+        If the base world does not have the plan's robots.
+    """
+    file = folder.resolve() / f"{plan.scenario}-{seed}.world"
+    write_world(plan, world or world_file(plan.world), file)
     return {
         "mode": "lockstep",
         "lockstep_target": "true",
@@ -34,24 +62,19 @@ def simulation_arguments(scenario, seed, resolution, image_noise, world=None):
         "resolution": resolution,
         "image_noise": image_noise,
         "seed": seed,
-        "vehicle_pose": _pose(scenario.spiri_pose(seed)),
-        "target_pose": _pose(scenario.husky_pose(seed)),
-        "world": world.resolve() if world else world_file(scenario.world),
+        "world": file,
     }
 
 
-def _pose(values):
-    return ",".join(f"{value:.6f}" for value in values)
-
-
-def _twist(forward, left, turn):
+def _twist(forward, left, up, turn):
     command = Twist()
-    command.linear.x, command.linear.y, command.angular.z = forward, left, turn
+    command.linear.x, command.linear.y, command.linear.z = forward, left, up
+    command.angular.z = turn
     return command
 
 
 class Stage:
-    """Where a scenario is played: a simulation in lockstep that waits for /cmd_vel and /husky/cmd_vel.
+    """Where a plan is played: a simulation in lockstep that waits for the drone's and the target's commands.
 
     A frame is answered only once every watched message of it is here and has been dealt with, so that every
     run of a seed sees the same commands at the same frames. Where the follower answers as well, `run_ahead`
@@ -59,22 +82,20 @@ class Stage:
 
     Parameters
     ----------
-    scenario : Scenario
-    seed : int
-        Of the scenario's script.
+    plan : Plan
     watched : iterable of str
         What belongs to a frame: any of truth, image, box, state.
     """
 
-    def __init__(self, scenario, seed, watched):
-        self._scenario, self._seed = scenario, seed
+    def __init__(self, plan, watched):
+        self._plan = plan
         self._sources = {kind: _SOURCES[kind] for kind in watched}
         self._frames = {}  # stamp -> {kind: message}
         self._changed = threading.Condition()
         self._ahead = False
-        self._drivers = {"/husky/cmd_vel": self._target_command}
-        if scenario.scripted:
-            self._drivers["/cmd_vel"] = scenario.drone_command
+        self._drivers = {_DRIVE_TOPIC[plan.target_robot]: plan.target_command}
+        if plan.scripted:
+            self._drivers[_FLY_TOPIC] = plan.drone_command
         self._publishers = {
             topic: rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True) for topic in self._drivers
         }
@@ -88,24 +109,20 @@ class Stage:
         for topic in [*self._subscribers, *self._publishers.values()]:
             topic.unregister()
 
-    def _target_command(self, t, seed):
-        speed, turn = self._scenario.target_command(t, seed)
-        return speed, 0.0, turn
-
     def run_ahead(self):
         """Answer each frame as soon as its truth is here, from the next frame on.
 
-        For scenarios in which the follower flies: the simulation still waits for its command.
+        For plans in which the follower flies: the simulation still waits for its command.
         """
         self._ahead = True
 
     def _answer(self, t):
         for topic, command_at in self._drivers.items():
-            self._publishers[topic].publish(_twist(*command_at(t, self._seed)))
+            self._publishers[topic].publish(_twist(*command_at(t)))
 
     def _store(self, message, kind):
         stamp = message.captured if kind == "box" else message.header.stamp
-        if kind == "truth" and self._ahead and stamp.to_sec() < self._scenario.end:
+        if kind == "truth" and self._ahead and stamp.to_sec() < self._plan.end:
             self._answer(stamp.to_sec())
         with self._changed:
             self._frames.setdefault(stamp, {})[kind] = message
@@ -119,7 +136,7 @@ class Stage:
         wait_for_edges(own | set(edges), alive=alive)
 
     def frames(self, alive=lambda: None):
-        """Start the simulation and yield its frames up to the scenario's end, each answered before the next.
+        """Start the simulation and yield its frames up to the plan's end, each answered before the next.
 
         Parameters
         ----------
@@ -141,7 +158,7 @@ class Stage:
             t = done.to_sec()
             answered_ahead = self._ahead
             yield t, frame
-            if t >= self._scenario.end:
+            if t >= self._plan.end:
                 return
             if not answered_ahead:
                 self._answer(t)

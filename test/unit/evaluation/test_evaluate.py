@@ -109,7 +109,7 @@ def filmed(monkeypatch, folder):
     calls = []
 
     def shoot(scenario, seeds, directory):
-        calls.append((scenario.name, list(seeds)))
+        calls.append((scenario.__name__, list(seeds)))
         copies = [directory / f"fastboard-{seed}" for seed in seeds]
         return [shutil.copytree(folder, copy) for copy in copies]
 

@@ -1,9 +1,13 @@
 import numpy as np
 import pytest
 
-from tld_follower.evaluation.metrics import flight_figures
+from tld_follower.evaluation.metrics import FOLLOWING, flight_figures, summary
 
 DRIVE = 12.0
+
+
+def figures_of(trace, wanted=(*FOLLOWING, "recovered_10s")):
+    return flight_figures(trace, DRIVE, wanted)
 
 
 def flight(distance, box_visible=None, overlap=None, in_view=None):
@@ -23,7 +27,7 @@ def flight(distance, box_visible=None, overlap=None, in_view=None):
 
 
 def test_a_perfect_flight():
-    figures = flight_figures(flight(lambda t: 1.0), DRIVE)
+    figures = figures_of(flight(lambda t: 1.0))
     for name in ("peak_gap_m", "steady_error_m", "rmse_m", "overshoot_m", "settle_s"):
         assert figures[name] == 0
     assert figures["tracked_fraction"] == figures["visible_fraction"] == 1
@@ -42,7 +46,7 @@ def test_each_figure_looks_at_its_own_part_of_the_flight():
             return 0.8
         return 1.0
 
-    figures = flight_figures(flight(distance), DRIVE)
+    figures = figures_of(flight(distance))
     assert figures["peak_gap_m"] == pytest.approx(0.9)
     assert figures["steady_error_m"] == pytest.approx(0.3)
     assert figures["overshoot_m"] == pytest.approx(0.2)
@@ -52,40 +56,86 @@ def test_each_figure_looks_at_its_own_part_of_the_flight():
 
 
 def test_never_settled():
-    assert flight_figures(flight(lambda t: 1.1), DRIVE)["settle_s"] is None
+    assert figures_of(flight(lambda t: 1.1))["settle_s"] is None
 
 
 def test_losses_count_and_boxes_off_the_target_are_not_tracked():
-    figures = flight_figures(
+    figures = figures_of(
         flight(
             lambda t: 1.0,
             box_visible=lambda t: ~(((t >= 2) & (t < 3)) | (t >= 15)),
             overlap=lambda t: np.where(t < 0, 0.2, 0.9),
-        ),
-        DRIVE,
+        )
     )
-    assert (figures["losses"], figures["recoveries"]) == (2, 1)
-    assert figures["recovery_s"] == pytest.approx(1.0)
+    assert (figures["losses"], figures["recoveries"]) == (3, 2)  # the first while off the target
+    assert figures["recovery_s"] == pytest.approx(2.0)
     assert figures["tracked_fraction"] == pytest.approx((20 - 2 - 1 - 3) / 20)
 
 
 def test_frames_without_the_target_do_not_count_as_missed():
-    figures = flight_figures(
-        flight(lambda t: 1.0, box_visible=lambda t: t < 8, in_view=lambda t: t < 8), DRIVE
-    )
+    figures = figures_of(flight(lambda t: 1.0, box_visible=lambda t: t < 8, in_view=lambda t: t < 8))
     assert figures["visible_fraction"] == pytest.approx(0.5)
     assert figures["tracked_fraction"] == 1
     assert (figures["wrong_boxes"], figures["boxes_while_hidden"]) == (0, 0)
 
 
 def test_boxes_where_the_target_is_not_are_wrong():
-    figures = flight_figures(
+    figures = figures_of(
         flight(
             lambda t: 1.0,
             box_visible=lambda t: t < 10,
             overlap=lambda t: np.where((t >= 2) & (t < 5), 0.0, 0.8),
             in_view=lambda t: (t < 4) | (t >= 5),
-        ),
-        DRIVE,
+        )
     )
     assert (figures["wrong_boxes"], figures["boxes_while_hidden"]) == (90, 30)
+
+
+def test_a_loss_counts_from_the_target_lost_to_the_target_tracked_again():
+    def tracked(t):
+        # Lost for 0.2 s, too short; for 4 s, of which a wrong box is shown for the first half.
+        return ~((t >= 1) & (t < 1.2)) & ~((t >= 5) & (t < 9))
+
+    figures = figures_of(
+        flight(
+            lambda t: 1.0,
+            box_visible=lambda t: tracked(t) | ((t >= 5) & (t < 7)),
+            overlap=lambda t: np.where(tracked(t), 0.8, 0.0),
+        )
+    )
+    assert (figures["losses"], figures["recoveries"]) == (1, 1)
+    assert figures["recovery_s"] == pytest.approx(4.0)
+    assert figures["recovered_10s"] is True
+
+
+@pytest.mark.parametrize(
+    ("lost", "recovered"), [(lambda t: t >= 17, False), (lambda t: (t >= 1) & (t < 11.5), False)]
+)
+def test_not_recovered_within_ten_seconds_or_until_the_end(lost, recovered):
+    figures = figures_of(flight(lambda t: 1.0, box_visible=lambda t: ~lost(t)))
+    assert figures["recovered_10s"] is recovered
+
+
+def test_what_makes_no_sense_is_none():
+    figures = figures_of(flight(lambda t: 1.0), wanted=("rmse_m",))
+    assert figures["rmse_m"] == 0.0
+    assert {figures[name] for name in FOLLOWING if name != "rmse_m"} == {None}
+    assert figures["recovered_10s"] is None
+
+
+def test_the_summary_has_the_worst_the_mean_and_the_shares():
+    good = figures_of(flight(lambda t: 1.0))
+    bad = figures_of(flight(lambda t: 1.2, box_visible=lambda t: t < 5))
+    runs = [
+        {"seed": 0, **good, "trace": {}},
+        {"seed": 1, "error": "it died"},
+        {"seed": 2, **bad, "trace": {}},
+    ]
+    total = summary(runs)
+    assert (total["runs"], total["failed"]) == (3, 1)
+    assert (total["collision_free"], total["recovered_10s"]) == (0.0, 0.5)
+    assert total["worst"]["rmse_m"] == pytest.approx(0.2)
+    assert total["mean"]["rmse_m"] == pytest.approx(0.1)
+    assert total["worst"]["tracked_fraction"] == bad["tracked_fraction"]
+    assert total["worst"]["settle_s"] is None  # one never settled
+    assert summary(runs[1:2])["worst"] == {}

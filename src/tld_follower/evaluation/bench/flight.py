@@ -12,7 +12,7 @@ from sensor_msgs.msg import CameraInfo, RegionOfInterest
 
 from tld_follower.evaluation import graph
 from tld_follower.evaluation.bench.cpu import Stopwatch, node_pids
-from tld_follower.evaluation.scenarios import SPIRI_START
+from tld_follower.evaluation.scenarios import straight
 from tld_follower.msg import FollowState, Truth
 
 RESOLUTION, RATE = "640x480", 30.0
@@ -157,7 +157,7 @@ def measure(tracker, count, logs, tell):
         "resolution": RESOLUTION,
         "max_speed": 1.5,
         "tracker": tracker,
-        "spiri_pose": ",".join(map(str, SPIRI_START)),
+        "vehicle_pose": ",".join(map(str, straight(0).drone)),
     }
     tell(f"graph: {count} frames in real time")
     observer = Observer()
