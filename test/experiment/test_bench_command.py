@@ -13,9 +13,8 @@ BENCH = Path(__file__).resolve().parents[2] / "scripts" / "bench"
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
     path = tmp_path_factory.mktemp("bench") / "bench.json"
-    parts = ["tracker", "stereo", "simulator", "graph"]  # lockstep is the experiment's own test
     done = subprocess.run(
-        [BENCH, "--frames", "6", "--json", path, "--part", *parts],
+        [BENCH, "--frames", "6", "--json", path],
         capture_output=True,
         text=True,
         timeout=600,
@@ -58,3 +57,8 @@ def test_the_whole_graph(result):
         flight["cpu_ms_per_frame"]
     )
     assert all(cpu_ms > 0 for cpu_ms in flight["cpu_ms_per_frame"].values())
+
+
+def test_lockstep(result):
+    assert result["lockstep"]["scenario"] == "straight"
+    assert result["lockstep"]["real_time_factor"] > 0.05

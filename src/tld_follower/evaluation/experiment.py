@@ -16,7 +16,7 @@ import rospy
 from tld_follower.evaluation import flight_report, graph, plots
 from tld_follower.evaluation.film import Film
 from tld_follower.evaluation.flight import Flight
-from tld_follower.evaluation.metrics import flight_figures, summary
+from tld_follower.evaluation.metrics import first_difference, flight_figures, summary
 from tld_follower.evaluation.scenarios import SCENARIOS
 from tld_follower.evaluation.stage import simulation_arguments
 from tld_follower.evaluation.worlds import WorldError
@@ -76,6 +76,9 @@ def parse_arguments(argv):
         "--seeds", type=_number(int, 1, "a positive number"), default=1, metavar="N", help="how many runs"
     )
     parser.add_argument("--first-seed", type=_number(int, 0, "a seed: 0 or more"), default=0, metavar="K")
+    parser.add_argument(
+        "--twice", action="store_true", help="fly every seed twice; it fails unless both traces are identical"
+    )
     parser.add_argument("--json", type=Path, metavar="F", help="write settings, figures and traces")
     parser.add_argument(
         "--report", type=Path, metavar="DIR", help="write a page with plots, and a video of the first run"
@@ -103,16 +106,19 @@ def launch_arguments(settings, plan, seed, distance, folder):
     }
 
 
-def fly(settings, seed, distance, logs, video):
-    """Fly one seed on a fresh graph; return the run's object for the JSON. `video` is a path or None."""
+def fly(settings, seed, distance, logs, video=None, film=None):
+    """Fly one seed on a fresh graph; return the run's object for the JSON.
+
+    `video` is a file, `film` a folder for sequences; None for none.
+    """
     plan = SCENARIOS[settings.scenario](seed)
     with ExitStack() as stack:
         watchers = []
         if video:
             size = tuple(map(int, settings.resolution.split("x")))
             watchers.append(plots.Video(video, size, FRAME_RATE))
-        if settings.film:
-            watchers.append(Film(settings.film / f"{plan.scenario}-{seed}"))
+        if film:
+            watchers.append(Film(film / f"{plan.scenario}-{seed}"))
         for watcher in watchers:
             stack.callback(watcher.close)
         flight = Flight(plan, [watcher.add for watcher in watchers])
@@ -146,6 +152,14 @@ def prepare(settings):
     return logs
 
 
+def fly_again(settings, run, distance, logs):
+    """Fly the seed of a run once more; GraphError unless the trace is the same."""
+    again = fly(settings, run["seed"], distance, logs)
+    difference = first_difference(run["trace"], again["trace"])
+    if difference:
+        raise graph.GraphError(f"not repeatable: two flights part at {difference}")
+
+
 def fly_all(settings, logs, results):
     """Fly every seed for every way to measure the distance; a run that fails costs no other.
 
@@ -175,7 +189,11 @@ def fly_all(settings, logs, results):
             _tell(f"{settings.scenario}, distance from {distance}, seed {seed} ...")
             video = f"left_camera_{distance}.webm" if settings.report and distance not in videos else None
             try:
-                runs.append(fly(settings, seed, distance, logs, settings.report / video if video else None))
+                path = settings.report / video if video else None
+                run = fly(settings, seed, distance, logs, path, settings.film)
+                if settings.twice:
+                    fly_again(settings, run, distance, logs)
+                runs.append(run)
                 if video:
                     videos[distance] = video
             except (graph.GraphError, rospy.ROSException) as error:

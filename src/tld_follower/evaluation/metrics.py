@@ -54,6 +54,26 @@ def _following(t, distance, drive_s):
     return dict(zip(FOLLOWING, values, strict=True))
 
 
+def first_difference(first, second):
+    """Find where two traces of the same seed part.
+
+    Parameters
+    ----------
+    first, second : dict of lists, one entry a frame
+
+    Returns
+    -------
+    str or None
+        The time of the first frame that differs, and in what; None if the traces are identical.
+    """
+    lengths = [len(trace["t"]) for trace in (first, second)]
+    for index in range(min(lengths)):
+        names = [name for name in first if first[name][index] != second[name][index]]
+        if names:
+            return f"t = {first['t'][index]:.3f} s, in {', '.join(names)}"
+    return None if lengths[0] == lengths[1] else f"the end: {lengths[0]} and {lengths[1]} frames"
+
+
 def flight_figures(trace, drive_s, wanted):
     """Compute the figures of one flight.
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tld_follower.evaluation.metrics import FOLLOWING, flight_figures, summary
+from tld_follower.evaluation.metrics import FOLLOWING, first_difference, flight_figures, summary
 
 DRIVE = 12.0
 
@@ -139,3 +139,19 @@ def test_the_summary_has_the_worst_the_mean_and_the_shares():
     assert total["worst"]["tracked_fraction"] == bad["tracked_fraction"]
     assert total["worst"]["settle_s"] is None  # one never settled
     assert summary(runs[1:2])["worst"] == {}
+
+
+def test_identical_traces_do_not_differ():
+    assert first_difference(flight(lambda t: t), flight(lambda t: t)) is None
+
+
+def test_the_first_difference_of_two_traces_is_named():
+    first, second = flight(lambda t: 1.0), flight(lambda t: 1.0 if t < 3 else 1.0 + 1e-15)
+    second["overlap"][-1] = 0.0
+    assert first_difference(first, second) == "t = 3.000 s, in distance"
+
+
+def test_a_trace_that_ends_earlier_differs():
+    first = flight(lambda t: 1.0)
+    second = {name: values[:-1] for name, values in first.items()}
+    assert first_difference(first, second) == "the end: 600 and 599 frames"

@@ -22,7 +22,7 @@ def _measure_lockstep(settings, logs):
     """Fly `experiment straight` without report; returns the object for the JSON."""
     _tell("lockstep: straight")
     chosen = experiment.parse_arguments(["straight", "--tracker", settings.tracker])
-    run = experiment.fly(chosen, 0, logs, None)
+    run = experiment.fly(chosen, 0, "stereo", logs)
     return {
         "scenario": chosen.scenario,
         "resolution": chosen.resolution,
