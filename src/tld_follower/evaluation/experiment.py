@@ -19,7 +19,7 @@ from tld_follower.evaluation.flight import Flight
 from tld_follower.evaluation.metrics import first_difference, flight_figures, summary
 from tld_follower.evaluation.scenarios import SCENARIOS
 from tld_follower.evaluation.stage import simulation_arguments
-from tld_follower.evaluation.worlds import WorldError
+from tld_follower.evaluation.worlds import WorldError, write_world
 from tld_follower.following.parameters import CONTROLS, DISTANCES, Parameters
 
 FRAME_RATE = 30.0
@@ -133,8 +133,8 @@ def fly(settings, seed, distance, logs, video=None, film=None):
     return {"seed": seed, **figures, "real_time_factor": real_time_factor, "trace": trace}
 
 
-def prepare(settings):
-    """Make the folders of report, films and JSON, and try the world.
+def prepare(settings, logs):
+    """Make the folders of report, films and JSON, and try the user's world.
 
     Raises
     ------
@@ -146,10 +146,8 @@ def prepare(settings):
     if settings.json:
         settings.json.resolve().parent.mkdir(parents=True, exist_ok=True)
         settings.json.open("a").close()
-    logs = Path(tempfile.mkdtemp(prefix="tld_follower-experiment-"))
-    plan = SCENARIOS[settings.scenario](settings.first_seed)
-    simulation_arguments(plan, settings.first_seed, "", 0.0, logs, settings.world)
-    return logs
+    if settings.world:
+        write_world(SCENARIOS[settings.scenario](settings.first_seed), settings.world, logs / "first.world")
 
 
 def fly_again(settings, run, distance, logs):
@@ -218,8 +216,9 @@ def main(argv=None):
     if settings.world and not settings.world.is_file():
         _tell(f"no world file {settings.world}")
         return 2
+    logs = Path(tempfile.mkdtemp(prefix="tld_follower-experiment-"))
     try:
-        logs = prepare(settings)
+        prepare(settings, logs)
     except (OSError, WorldError) as error:
         _tell(error)
         return 2
