@@ -24,10 +24,12 @@ struct MatcherParameters {
   double uniqueness_ratio = 15;      ///< Margin of the best match over the next [%].
   int texture_threshold = 10;        ///< Least sum of gradients in a window (block matching).
   int speckle_size = 100;            ///< Regions up to this size are rejected [pixel].
-  int speckle_range = 4;             ///< Largest step of disparity inside a region [pixel].
-  bool full_dp = false;              ///< Two-pass dynamic programming (semi-global).
-  double p1 = 200, p2 = 400;         ///< Penalties of small and of larger steps (semi-global).
-  int disp12_max_diff = 0;           ///< Largest left-right disagreement [pixel] (semi-global).
+  /// Largest step of disparity inside a region, as OpenCV counts it: in 1/16 pixel for block
+  /// matching, in pixels for semi-global.
+  int speckle_range = 4;
+  bool full_dp = false;       ///< Two-pass dynamic programming (semi-global).
+  double p1 = 200, p2 = 400;  ///< Penalties of small and of larger steps (semi-global).
+  int disp12_max_diff = 0;    ///< Largest left-right disagreement [pixel] (semi-global).
 };
 
 /// Finds the disparity x_l - x_r of every pixel of a rectified left image.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <nodelet/nodelet.h>
 
+#include <exception>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -11,8 +12,12 @@ namespace tld_follower::stereo {
 /// StereoNode in a nodelet manager: images and results pass as shared pointers within it.
 class StereoCloudNodelet : public nodelet::Nodelet {
  private:
-  // A std::invalid_argument of a wrong parameter goes to the manager, which tells the loader.
-  void onInit() override { node_.emplace(getNodeHandle(), getPrivateNodeHandle()); }
+  void onInit() override try {
+    node_.emplace(getNodeHandle(), getPrivateNodeHandle());
+  } catch (const std::exception& problem) {
+    NODELET_FATAL("%s", problem.what());
+    throw;  // The manager tells the loader, which ends, and goes on without this nodelet.
+  }
 
   std::optional<StereoNode> node_;
 };

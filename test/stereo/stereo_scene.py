@@ -108,14 +108,14 @@ class Results:
             subscriber.unregister()
 
     def of(self, stamps):
-        """The messages, one a topic, that belong to one of the stamps; None while one is missing."""
-        found = []
-        for topic in self.topics:
-            match = [m for m in list(self.got[topic]) if m.header.stamp in stamps]
-            if not match:
-                return None
-            found.append(match[-1])
-        return found
+        """The messages, one a topic, of the newest stamp that every topic has; None if there is none."""
+        for stamp in reversed(stamps):
+            found = [
+                next((m for m in list(self.got[t]) if m.header.stamp == stamp), None) for t in self.topics
+            ]
+            if None not in found:
+                return found
+        return None
 
 
 def wait_for(condition, what):
