@@ -9,10 +9,11 @@ import numpy as np
 from numba import njit
 
 from tld_follower.box import Box
-from tld_follower.tld.ferns import Ferns, scan_windows
+from tld_follower.tld.ferns import Ferns
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.object_model import ObjectModel, Similarity
 from tld_follower.tld.parameters import Parameters
+from tld_follower.tld.scanning import scan_windows
 from tld_follower.tld.storage import Model
 from tld_follower.tld.windows import WindowSize, window_sizes
 
@@ -141,7 +142,7 @@ class Detector:
             (around.y + around.height) / size.factor,
         )
         return scan_windows(
-            level.blurred,
+            level.columns(int(size.grid[2]) * sparse[0]),
             integral,
             squares,
             size.grid,

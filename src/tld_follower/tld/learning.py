@@ -10,6 +10,7 @@ from tld_follower.box import Box
 from tld_follower.tld.detector import Detections, Detector, overlaps
 from tld_follower.tld.ferns import fern_codes
 from tld_follower.tld.frame import Frame
+from tld_follower.tld.object_model import relative_similarity, similarity_to
 from tld_follower.tld.parameters import Parameters
 from tld_follower.tld.windows import WindowSize
 
@@ -96,16 +97,19 @@ class Learner:
     def _add_negatives(self, patches: np.ndarray) -> None:
         """Add those that the model, with the ones before them, takes for the target."""
         model = self._detector.model
-        remaining = patches
-        while len(remaining):
-            similarity = model.similarity(remaining).relative
-            wrong = similarity > self._parameters.negative_threshold
-            if not wrong.any():
-                return
+        compared = model.similarity(patches)
+        positive, negative = compared.positive, compared.negative
+        while len(patches):
+            similarity = relative_similarity(positive, negative)
             worst = int(np.argmax(similarity))
-            model.negatives.add(remaining[worst])
+            wrong = similarity > self._parameters.negative_threshold
+            if not wrong[worst]:
+                return
+            added = patches[worst : worst + 1]
+            model.negatives.add(added[0])
             wrong[worst] = False
-            remaining = remaining[wrong]
+            patches, positive, negative = patches[wrong], positive[wrong], negative[wrong]
+            negative = np.maximum(negative, similarity_to(added, patches))
 
     def _warped_codes(self, frame: Frame, box: Box, warps: int, rotation: float) -> np.ndarray:
         """Fern codes of the windows nearest to a box, as they are and in warped views of it.

@@ -42,7 +42,9 @@ class Templates:
 
     def __init__(self, capacity: int, protected: int) -> None:
         self._patches = np.zeros((capacity + 1, PATCH_SIZE), np.float32)
-        self._products = np.full((capacity + 1, capacity + 1), -np.inf, np.float32)
+        # Of each template: its product with the one most like it, and which that is.
+        self._nearest = np.full(capacity + 1, -np.inf, np.float32)
+        self._partner = np.full(capacity + 1, -1)
         self._capacity = capacity
         self._protected = min(protected, capacity)
         self._count = 0
@@ -59,23 +61,29 @@ class Templates:
         """Append a normalised patch (225,)."""
         last = self._count
         self._patches[last] = patch
-        products = best_products(self._patches[: last + 1], self._patches[last : last + 1])
-        self._products[last, :last] = products[:last]
-        self._products[:last, last] = products[:last]
         self._count += 1
+        if last:
+            products = best_products(self._patches[:last], self._patches[last : last + 1])
+            nearer = products > self._nearest[:last]
+            self._nearest[:last][nearer] = products[nearer]
+            self._partner[:last][nearer] = last
+            self._partner[last] = np.argmax(products)
+            self._nearest[last] = products.max()
         if self._count > self._capacity:
-            self._drop_redundant()
+            self._drop(self._protected + int(np.argmax(self._nearest[self._protected : self._count])))
 
-    def _drop_redundant(self) -> None:
-        free = self._products[self._protected : self._count, : self._count]
-        row = self._protected + int(np.argmax(free.max(axis=1)))
+    def _drop(self, row: int) -> None:
         last = self._count - 1
-        self._patches[row:last] = self._patches[row + 1 : last + 1].copy()
-        kept = np.delete(np.arange(self._count), row)
-        self._products[:last, :last] = self._products[np.ix_(kept, kept)]
-        self._products[last, :] = -np.inf
-        self._products[:, last] = -np.inf
+        alone = np.flatnonzero(self._partner[: self._count] == row)
+        for array in (self._patches, self._nearest, self._partner):
+            array[row:last] = array[row + 1 : self._count]
+        self._partner[:last] -= self._partner[:last] > row
         self._count = last
+        for index in alone - (alone > row):
+            products = best_products(self.patches, self._patches[index : index + 1])
+            products[index] = -np.inf
+            self._partner[index] = np.argmax(products)
+            self._nearest[index] = products.max()
 
 
 class ObjectModel:
@@ -98,20 +106,26 @@ class ObjectModel:
 
         A kind without templates counts as similarity 0.
         """
-        patches = np.ascontiguousarray(patches, np.float32)
         early = (len(self.positives) + 1) // 2
-        first = 0.5 + 0.5 * best_products(patches, self.positives.patches[:early])
-        rest = 0.5 + 0.5 * best_products(patches, self.positives.patches[early:])
-        positive = np.maximum(first, rest)
-        negative = 0.5 + 0.5 * best_products(patches, self.negatives.patches)
-        return Similarity(_relative(positive, negative), _relative(first, negative), positive, negative)
+        first = similarity_to(self.positives.patches[:early], patches)
+        positive = np.maximum(first, similarity_to(self.positives.patches[early:], patches))
+        negative = similarity_to(self.negatives.patches, patches)
+        return Similarity(
+            relative_similarity(positive, negative), relative_similarity(first, negative), positive, negative
+        )
 
     def positive_similarity(self, patches: np.ndarray) -> np.ndarray:
         """Return S+ (N,) of patches (N, 225), normalised."""
-        return 0.5 + 0.5 * best_products(np.ascontiguousarray(patches, np.float32), self.positives.patches)
+        return similarity_to(self.positives.patches, patches)
 
 
-def _relative(positive: np.ndarray, negative: np.ndarray) -> np.ndarray:
+def similarity_to(templates: np.ndarray, patches: np.ndarray) -> np.ndarray:
+    """Similarity (eq. 3.8), (N,) float32, of patches (N, 225) to the nearest of templates (M, 225)."""
+    return 0.5 + 0.5 * best_products(np.ascontiguousarray(patches, np.float32), templates)
+
+
+def relative_similarity(positive: np.ndarray, negative: np.ndarray) -> np.ndarray:
+    """Relative similarity (N,) from S+ and S- (N,); 0.5 where a patch is equal to both."""
     from_positive, from_negative = 1.0 - positive, 1.0 - negative
     total = from_positive + from_negative
     return np.where(total > 1e-9, from_negative / np.maximum(total, 1e-9), 0.5)
@@ -120,6 +134,9 @@ def _relative(positive: np.ndarray, negative: np.ndarray) -> np.ndarray:
 @njit(cache=True, fastmath=True)
 def best_products(patches, templates):
     """Largest dot product of each patch with any template, -1 without templates.
+
+    The product of the two matrices, tile by tile: as fast as a single-threaded BLAS for a hundred patches,
+    faster for few, and always one thread.
 
     Parameters
     ----------
@@ -130,13 +147,22 @@ def best_products(patches, templates):
     -------
     (N,) float32, clipped to -1..1
     """
-    result = np.empty(patches.shape[0], np.float32)
-    for n in range(patches.shape[0]):
-        best = np.float32(-1.0)
-        for m in range(templates.shape[0]):
-            total = np.float32(0.0)
+    result = np.full(patches.shape[0], np.float32(-1.0))
+    tiled = templates.shape[0] // 4 * 4
+    for m in range(0, tiled, 4):
+        for n in range(patches.shape[0]):
+            a = b = c = d = np.float32(0.0)
             for i in range(patches.shape[1]):
-                total += patches[n, i] * templates[m, i]
-            best = max(best, total)
-        result[n] = min(best, np.float32(1.0))
-    return result
+                value = patches[n, i]
+                a += value * templates[m, i]
+                b += value * templates[m + 1, i]
+                c += value * templates[m + 2, i]
+                d += value * templates[m + 3, i]
+            result[n] = max(result[n], a, b, c, d)
+    for m in range(tiled, templates.shape[0]):
+        for n in range(patches.shape[0]):
+            a = np.float32(0.0)
+            for i in range(patches.shape[1]):
+                a += patches[n, i] * templates[m, i]
+            result[n] = max(result[n], a)
+    return np.minimum(result, np.float32(1.0))

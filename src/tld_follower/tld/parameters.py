@@ -14,8 +14,8 @@ LOWER_BOUNDS = {
     **{"blur": 0.0, "fusion_weight": 0.0, "max_residual": 0.0, "lk_window": 2, "sift_side": 8.0},
     "depth_size": 1.0,
 }
-# A fern has a table of 2^comparisons posteriors.
-MAX_COMPARISONS = 20
+# A fern has a table of 2^comparisons posteriors; the scan makes codes of 16 bits.
+MAX_COMPARISONS = 16
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ class WindowSize:
     ----------
     width, height : size in the image [pixel].
     octave : the level that they are scanned on; one pixel of it is `factor` pixels of the image.
-    grid : (width, height, step x, step y) [pixel of the level].
+    grid : (width, height, step x, step y) [pixel of the level]; step x is whole, as `scan_windows` wants it.
     offsets : (ferns, comparisons, 4) int32, the fern comparisons in such a window.
     """
 
@@ -62,7 +62,8 @@ def window_sizes(box: Box, comparisons: np.ndarray, parameters: Parameters) -> l
         octave = max(0, int(np.floor(np.log2(np.sqrt(width * height) / parameters.window_side))))
         factor = 1 << octave
         level_w, level_h = max(width / factor, 2.0), max(height / factor, 2.0)
-        grid = (level_w, level_h, max(parameters.shift * level_w, 1.0), max(parameters.shift * level_h, 1.0))
+        steps = float(max(round(parameters.shift * level_w), 1)), max(parameters.shift * level_h, 1.0)
+        grid = (level_w, level_h, *steps)
         offsets = pixel_offsets(comparisons, round(level_w), round(level_h))
         sizes.append(WindowSize(width, height, octave, factor, grid, offsets))
     return sizes

@@ -37,19 +37,18 @@ def detector(scene):
     return trained(scene)
 
 
-def test_finds_the_target_elsewhere(scene, detector):
-    place = Box(100.3, 20.6, 36.0, 30.0)
+@pytest.mark.parametrize("place", [Box(100.3, 20.6, 36.0, 30.0), Box(60, 40, 36, 30).scale(1.2**2)], ids=str)
+def test_finds_the_target_elsewhere_and_larger(scene, place):
     frame = Frame(scene.frame(place), 3.0)
-    clusters = detector.clusters(detector.detect(frame, TARGET, 4))
-    assert len(clusters) == 1
-    assert clusters[0].box.overlap(place) > 0.7
-    assert clusters[0].confidence > detector.nn_threshold
-
-
-def test_finds_the_target_larger(scene, detector):
-    place = Box(60, 40, 36, 30).scale(1.2**2)
-    clusters = detector.clusters(detector.detect(Frame(scene.frame(place), 3.0), TARGET, 4))
-    assert clusters[0].box.overlap(place) > 0.6
+    overlap = []
+    for seed in range(4):
+        detector = trained(scene, seed=seed)
+        clusters = detector.clusters(detector.detect(frame, TARGET, 4))
+        assert len(clusters) == 1
+        assert clusters[0].confidence > detector.nn_threshold
+        overlap.append(clusters[0].box.overlap(place))
+    assert min(overlap) > 0.5
+    assert np.mean(overlap) > 0.7
 
 
 def test_finds_nothing_where_there_is_none(scene, detector):

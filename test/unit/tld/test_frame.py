@@ -64,6 +64,17 @@ def test_octaves_end_before_the_pixels_do():
     assert frame.level(20).gray.shape == (2, 2)
 
 
+@pytest.mark.parametrize("blur", [0.3, 2.0, 3.0, 7.5])
+@pytest.mark.parametrize("shape", [(50, 70), (4, 9)])
+def test_the_blurred_copy_is_gaussian_to_a_grey_level(blur, shape):
+    image = texture(50, 70, 3)[: shape[0], : shape[1]]
+    size = 2 * round(3.0 * blur) + 1
+    expected = cv2.GaussianBlur(image, (size, size), blur, borderType=cv2.BORDER_REFLECT_101)
+    difference = np.abs(Frame(image, blur).level(0).blurred.astype(int) - expected)
+    assert difference.max() <= 1
+    assert difference.mean() < 0.1
+
+
 def test_variance_is_that_of_the_pixels_inside():
     image = texture(60, 80, seed=4)
     frame = Frame(image, 3.0)

@@ -140,3 +140,14 @@ def test_targets_at_the_limits_are_learnt(box):
     detector, learner = learner_for(frame, box)
     learner.initialise(frame, box)
     assert len(detector.model.positives) == 1
+
+
+def test_negatives_are_added_until_the_model_knows_the_rest():
+    detector, learner = learner_for(view(BOX), BOX)
+    model, rng = detector.model, np.random.default_rng(3)
+    boxes = np.stack([*rng.uniform(0, 90, (2, 60)), np.full(60, 32.0), np.full(60, 28.0)], axis=1)
+    wrong = view(BOX).patches(boxes)
+    model.positives.add(wrong[0])
+    learner._add_negatives(wrong[1:])
+    assert 0 < len(model.negatives) < 59
+    assert model.similarity(wrong[1:]).relative.max() <= PARAMETERS.negative_threshold + 1e-6

@@ -12,8 +12,9 @@ def patches(count, seed):
     return values / np.linalg.norm(values, axis=1, keepdims=True)
 
 
-def test_best_products_match_a_matrix_product():
-    a, b = patches(20, 0), patches(30, 1)
+@pytest.mark.parametrize("templates", [1, 3, 4, 30])
+def test_best_products_match_a_matrix_product(templates):
+    a, b = patches(20, 0), patches(templates, 1)
     np.testing.assert_allclose(best_products(a, b), (a @ b.T).max(axis=1), atol=1e-5)
     np.testing.assert_array_equal(best_products(a, b[:0]), -1.0)
 
@@ -72,6 +73,23 @@ class TestTemplates:
         products = templates.patches @ templates.patches.T
         assert len(templates) == 4
         assert np.abs(products - np.eye(4)).max() < 0.5
+
+    def test_what_stays_is_what_a_search_of_all_pairs_leaves(self):
+        rng = np.random.default_rng(6)
+        seeds = patches(12, 7)
+        every = seeds[rng.integers(0, 12, 60)] + 0.05 * rng.standard_normal((60, PATCH_SIZE)).astype(
+            np.float32
+        )
+        every /= np.linalg.norm(every, axis=1, keepdims=True)
+        templates, kept = Templates(9, protected=1), []
+        for index, patch in enumerate(every):
+            templates.add(patch)
+            kept.append(index)
+            if len(kept) > 9:
+                products = every[kept] @ every[kept].T - 9.0 * np.eye(len(kept), dtype=np.float32)
+                # Two are equally near to each other: the older one goes.
+                del kept[1 + int(np.argmax(np.round(products.max(axis=1)[1:], 5)))]
+            np.testing.assert_array_equal(templates.patches, every[kept])
 
     def test_a_cap_of_one_keeps_the_first(self):
         templates = Templates(1, protected=1)
