@@ -171,6 +171,10 @@ class Detector:
             self.model.similarity(patches),
         )
 
+    def accepts(self, relative: np.ndarray | float) -> np.ndarray | bool:
+        """Whether relative similarities are at most `redetection_margin` under the threshold."""
+        return relative > self.nn_threshold - self._parameters.redetection_margin
+
     def clusters(self, detections: Detections) -> list[Cluster]:
         """Group the detections that may be the target by overlap, the most confident first.
 
@@ -179,7 +183,7 @@ class Detector:
         """
         parameters = self._parameters
         similarity = detections.similarity
-        accepted = np.flatnonzero(similarity.relative > self.nn_threshold - parameters.redetection_margin)
+        accepted = np.flatnonzero(self.accepts(similarity.relative))
         boxes, weights = detections.boxes[accepted], similarity.relative[accepted]
         labels = label_clusters(boxes, CLUSTER_OVERLAP)
         clusters = []

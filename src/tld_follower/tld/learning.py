@@ -30,11 +30,18 @@ class Learner:
         self._texture = self._noise_texture()
 
     def _noise_texture(self) -> np.ndarray:
-        """Make the texture that `_noise` cuts from; no view of the target is larger than two windows."""
+        """Make the texture that `_noise` cuts from, larger than any view of the target.
+
+        A view holds windows that overlap the target's box by p or more. Along an axis, a window of length w
+        then shares p (w + b) / (1 + p) with a box of length b, and sqrt(p) b is at most w. So the view, the
+        box and what windows have outside it on both sides, is at most as long as below.
+        """
         parameters = self._parameters
         sizes = np.array([size.grid[1::-1] for size in self._detector.sizes])
+        least = parameters.positive_overlap
+        length = (2.0 + (1.0 - least) / np.sqrt(least)) / (1.0 + least)
         margin = NOISE_ROOM + 2 * _reach(parameters)
-        height, width = (2.0 * np.ceil(sizes.max(axis=0))).astype(int) + margin
+        height, width = np.ceil(length * sizes.max(axis=0)).astype(int) + margin
         noise = np.random.default_rng(0).standard_normal((height, width), np.float32)
         return cv2.GaussianBlur(noise * np.float32(parameters.warp_noise), (0, 0), parameters.blur)
 

@@ -12,7 +12,7 @@ TRACKERS = ("tld", "tld_sift")
 LOWER_BOUNDS = {
     **{"scale_step": 1.0, "shift": 0.0, "min_side": 2.0, "flow_side": 0.0, "window_side": 2.0},
     **{"blur": 0.0, "fusion_weight": 0.0, "max_residual": 0.0, "lk_window": 2, "sift_side": 8.0},
-    "depth_size": 1.0,
+    **{"depth_size": 1.0, "positive_overlap": 0.01},
 }
 # A fern has a table of 2^comparisons posteriors; the scan makes codes of 16 bits.
 MAX_COMPARISONS = 16
@@ -32,6 +32,7 @@ class Parameters:
     flow_side: float = 32.0
     flow_patch: int = 10
     max_fb_error: float = 0.25
+    motion_margin: float = 0.035
 
     scale_step: float = 1.2
     shift: float = 0.1
@@ -67,15 +68,18 @@ class Parameters:
     warp_shift: float = 0.01
     warp_noise: float = 5.0
     initial_negatives: int = 100
+    learning_inside: float = 0.9
 
     valid_threshold: float = 0.62
     lost_threshold: float = 0.5
     steady_threshold: float = 0.4
     provisional_threshold: float = 0.58
     max_residual: float = 0.05
+    doubt_inside: float = 0.3
     confirm_frames: int = 3
     persist_frames: int = 15
     patience_frames: int = 4
+    unsteady_weight: int = 2
     grace_frames: int = 20
     widen_frames: int = 8
 
@@ -91,6 +95,19 @@ class Parameters:
     sift_pixels: int = 25000
     sift_views: int = 10
     sift_interval: int = 10
+    sift_ratio: float = 0.75
+    sift_error: float = 0.08
+    sift_matches: int = 5
+
+    witness_ratio: float = 0.8
+    witness_error: float = 0.3
+    witness_least: int = 3
+    witness_enough: float = 0.5
+    witness_expected: float = 4.0
+    witness_few: float = 0.2
+    witness_first: float = 0.4
+    witness_rate: float = 0.05
+    witness_views: int = 3
 
     depth_error: float = 0.03
     depth_motion: float = 0.1

@@ -15,22 +15,10 @@ import numpy as np
 from tld_follower.box import Box
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.keypoints import SiftKeypoints
+from tld_follower.tld.parameters import Parameters
 
-RATIO = 0.75
-MIN_MATCHES = 5
-MAX_ERROR = 0.08
-
-# A witness's keypoints match less strictly, but lie within this share of the target's side of their places.
-WITNESS_RATIO = 0.8
-WITNESS_ERROR = 0.3
-# It speaks for a box with so many keypoints, and this share of those expected.
-MIN_WITNESSES, ENOUGH = 3, 0.5
-# Where so many are expected, it speaks against a box with only this share of them.
-MIN_EXPECTED, TOO_FEW = 4.0, 0.2
-# Of the first view's keypoints so many are expected again; later it is what trusted boxes showed.
-FIRST_SHARE, EXPECTATION_RATE = 0.4, 0.05
-# Views that make a memory mature.
-MATURE_VIEWS = 3
+# A proposal's change of size is within this ratio, and so much of it in the image.
+MAX_SCALE, MIN_INSIDE = 5.0, 0.5
 
 
 class Witness(IntEnum):
@@ -47,33 +35,29 @@ class SiftMemory:
     Parameters
     ----------
     keypoints : the detector of keypoints.
-    views : most views kept.
-    interval : calls of `learn` for each view taken.
-    budget : about the most pixels searched in a frame; larger images are searched in tiles, one a frame.
+    parameters : those named `sift_...` and `witness_...`.
     """
 
-    def __init__(self, keypoints: SiftKeypoints, views: int, interval: int, budget: int) -> None:
+    def __init__(self, keypoints: SiftKeypoints, parameters: Parameters) -> None:
         self._keypoints = keypoints
-        self._budget = budget
-        self._interval = interval
+        self._parameters = parameters
         self._calls = 0
         self._expected = 0.0
         self._views: list[tuple[np.ndarray, np.ndarray]] = []
-        self._capacity = views
 
     def learn(self, frame: Frame, box: Box) -> None:
         """Take in a trusted box; the oldest view but the first goes when the memory is full."""
         self._calls += 1
-        if (self._calls - 1) % self._interval:
+        if (self._calls - 1) % self._parameters.sift_interval:
             return
         points, descriptors = self._keypoints.detect(frame, box, self._keypoints.octave(box))
         if len(points) == 0:
             return
         if not self._views:
-            self._expected = FIRST_SHARE * len(points)
+            self._expected = self._parameters.witness_first * len(points)
         relative = (points - np.array(box.center, np.float32)) / np.float32(np.sqrt(box.area))
         self._views.append((relative.astype(np.float32), descriptors))
-        if len(self._views) > self._capacity:
+        if len(self._views) > self._parameters.sift_views:
             del self._views[1]
 
     @property
@@ -88,7 +72,7 @@ class SiftMemory:
     @property
     def mature(self) -> bool:
         """True once several looks are known: a single one says nothing of the target's other sides."""
-        return len(self._views) >= MATURE_VIEWS
+        return len(self._views) >= self._parameters.witness_views
 
     def ask(self, points: np.ndarray, descriptors: np.ndarray, box: Box, trusted: bool) -> Witness:
         """Judge a box by the keypoints about it.
@@ -98,21 +82,23 @@ class SiftMemory:
         points, descriptors : (N, 2) and (N, 128) float32, see `SiftKeypoints.around`.
         trusted : the box is the target for certain: it says how many keypoints are to be expected.
         """
-        count, expected = self._recognised(points, descriptors, box), self._expected
+        parameters, expected = self._parameters, self._expected
+        count = self._recognised(points, descriptors, box)
         if trusted:
-            self._expected += EXPECTATION_RATE * (count - expected)
-        if count >= max(MIN_WITNESSES, ENOUGH * expected):
+            self._expected += parameters.witness_rate * (count - expected)
+        if count >= max(parameters.witness_least, parameters.witness_enough * expected):
             return Witness.FOR
-        return Witness.AGAINST if expected >= MIN_EXPECTED and count <= TOO_FEW * expected else Witness.SILENT
+        missed = expected >= parameters.witness_expected and count <= parameters.witness_few * expected
+        return Witness.AGAINST if missed else Witness.SILENT
 
     def _recognised(self, points: np.ndarray, descriptors: np.ndarray, box: Box) -> int:
         """Count the keypoints that are known and lie where the target in this box has them."""
         if not self._views or len(points) < 2:
             return 0
-        known, pairs = self._matches(descriptors, WITNESS_RATIO)
+        known, pairs = self._matches(descriptors, self._parameters.witness_ratio)
         side = np.sqrt(box.area)
         places = known[pairs[:, 0]] * side + np.array(box.center)
-        near = np.hypot(*(points[pairs[:, 1]] - places).T) < WITNESS_ERROR * side
+        near = np.hypot(*(points[pairs[:, 1]] - places).T) < self._parameters.witness_error * side
         return len(set(pairs[near, 1].tolist()))
 
     def _matches(self, descriptors: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
@@ -142,28 +128,30 @@ class SiftMemory:
         """
         if not self._views:
             return None
+        parameters = self._parameters
         octave = self._keypoints.octave(last)
-        tiles = search_tiles(frame.width, frame.height, last, self._budget * 4**octave)
+        tiles = search_tiles(frame.width, frame.height, last, parameters.sift_pixels * 4**octave)
         points, descriptors = self._keypoints.detect(frame, tiles[turn % len(tiles)], octave)
         if len(points) < 2:
             return None
-        known, pairs = self._matches(descriptors, RATIO)
-        if len(np.unique(pairs[:, 1])) < MIN_MATCHES:
+        known, pairs = self._matches(descriptors, parameters.sift_ratio)
+        if len(np.unique(pairs[:, 1])) < parameters.sift_matches:
             return None
         source, target = known[pairs[:, 0]], points[pairs[:, 1]]
         side = np.sqrt(last.area)
+        error = parameters.sift_error * side + 1.0
         matrix, inliers = cv2.estimateAffinePartial2D(
-            source * side, target, method=cv2.RANSAC, ransacReprojThreshold=MAX_ERROR * side + 1.0
+            source * side, target, method=cv2.RANSAC, ransacReprojThreshold=error
         )
         if matrix is None:
             return None
         distinct = np.unique(pairs[inliers[:, 0] > 0, 1])
         scale = float(np.hypot(matrix[0, 0], matrix[1, 0]))
-        if len(distinct) < MIN_MATCHES or not 0.2 < scale < 5.0:
+        if len(distinct) < parameters.sift_matches or not 1.0 / MAX_SCALE < scale < MAX_SCALE:
             return None
         center = float(matrix[0, 2]), float(matrix[1, 2])
         box = Box.from_center(*center, last.width * scale, last.height * scale)
-        return box if box.inside_fraction(frame.width, frame.height) > 0.5 else None
+        return box if box.inside_fraction(frame.width, frame.height) > MIN_INSIDE else None
 
 
 def search_tiles(width: int, height: int, target: Box, budget: float) -> list[Box]:

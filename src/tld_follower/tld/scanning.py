@@ -21,8 +21,8 @@ def deinterleave(image: NDArray[np.uint8], step: int) -> NDArray[np.uint8]:
 
     Returns
     -------
-    (step * H * ceil(W / step) + BLOCK,) uint8: `step` planes, in plane r the columns r, r + step, ...; shorter
-    rows are filled up with 0, and so is the end, for a block of pixels to be read from anywhere.
+    (step * H * ceil(W / step) + BLOCK,) uint8: `step` planes, in plane r the columns r, r + step, ...;
+    shorter rows are filled up with 0, and so is the end, for a block of pixels to be read from anywhere.
     """
     height, width = image.shape
     pitch = -(-width // step)

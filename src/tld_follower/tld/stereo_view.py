@@ -19,7 +19,8 @@ import numpy as np
 
 from tld_follower.box import Box
 from tld_follower.tld.frame import to_gray
-from tld_follower.tld.tracker import Result, Tracker
+from tld_follower.tld.target import Result
+from tld_follower.tld.tracker import Tracker
 
 # Share of the target's area that the right image must show beyond the left one's to take over.
 MARGIN = 0.02

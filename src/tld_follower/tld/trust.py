@@ -6,9 +6,6 @@ from __future__ import annotations
 from tld_follower.tld.parameters import Parameters
 from tld_follower.tld.redetection import Witness
 
-# A weak frame in which the points also part company is worth this many weak frames.
-UNSTEADY_WEIGHT = 2
-
 
 class Trust:
     """The evidence for the box that is followed.
@@ -105,7 +102,7 @@ class Trust:
         if sure or not self._doubtful or witness is Witness.FOR:
             self._weak = 0
         else:
-            self._weak += 1 if steady else UNSTEADY_WEIGHT
+            self._weak += 1 if steady else parameters.unsteady_weight
         if self._weak > parameters.patience_frames:
             self._shown = 0
             return False

@@ -156,7 +156,9 @@ class TestSiftMemory:
         return Scene(320, 240, (80, 70))
 
     def memory(self, views=3):
-        return SiftMemory(SiftKeypoints(300, 96.0), views, 1, 10**6)
+        return SiftMemory(
+            SiftKeypoints(300, 96.0), Parameters(sift_views=views, sift_interval=1, sift_pixels=10**6)
+        )
 
     def test_proposes_the_target_where_it_came_back(self):
         scene, memory = self.scene(), self.memory()

@@ -61,6 +61,7 @@ def test_unknown_names_are_refused(name):
         ("window_side", 0.0),
         ("lk_window", 2),
         ("max_windows", 0),
+        ("positive_overlap", 0.01),
     ],
 )
 def test_wrong_values_are_refused_by_name(name, value):

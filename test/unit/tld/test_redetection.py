@@ -7,7 +7,8 @@ from synthetic_video import texture
 from tld_follower.box import Box
 from tld_follower.tld.frame import Frame
 from tld_follower.tld.keypoints import SiftKeypoints
-from tld_follower.tld.redetection import MATURE_VIEWS, SiftMemory, Witness, search_tiles
+from tld_follower.tld.parameters import Parameters
+from tld_follower.tld.redetection import SiftMemory, Witness, search_tiles
 
 BLUR = 3.0
 BOX = Box(100.0, 80.0, 80.0, 70.0)
@@ -22,7 +23,8 @@ def moved(image, dx, dy, scale):
 
 
 def memory(views=10, interval=1):
-    return SiftMemory(SiftKeypoints(200, 96.0), views, interval, 10**6)
+    parameters = Parameters(sift_views=views, sift_interval=interval, sift_pixels=10**6)
+    return SiftMemory(SiftKeypoints(200, 96.0), parameters)
 
 
 def view(seed):
@@ -118,7 +120,7 @@ def test_what_trusted_boxes_show_is_expected():
 
 def test_a_memory_matures_with_its_views():
     known = memory()
-    for seed in range(MATURE_VIEWS):
+    for seed in range(Parameters().witness_views):
         assert not known.mature
         known.learn(Frame(view(seed), BLUR), BOX)
     assert known.mature
@@ -150,7 +152,7 @@ def test_the_search_begins_where_the_target_was():
 
 
 def test_a_large_image_is_searched_tile_by_tile():
-    known = SiftMemory(SiftKeypoints(200, 96.0), 10, 1, 20000)
+    known = SiftMemory(SiftKeypoints(200, 96.0), Parameters(sift_interval=1, sift_pixels=20000))
     known.learn(Frame(view(0), BLUR), BOX)
     frame, truth = elsewhere(0, 70.0, -30.0, 1.0)
     turns = len(search_tiles(320, 240, BOX, 20000))
