@@ -10,10 +10,10 @@ from numba import njit
 
 from tld_follower.box import Box
 from tld_follower.tld.ferns import Ferns
-from tld_follower.tld.frame import Frame
+from tld_follower.tld.frame import Frame, Level
 from tld_follower.tld.object_model import ObjectModel, Similarity
 from tld_follower.tld.parameters import Parameters
-from tld_follower.tld.scanning import scan_windows
+from tld_follower.tld.scanning import deinterleave, scan_windows
 from tld_follower.tld.storage import Model
 from tld_follower.tld.windows import WindowSize, window_sizes
 
@@ -109,10 +109,16 @@ class Detector:
         stride = max(1, -(-total // self._parameters.max_windows))
         self.phase = (self.phase + 1) % stride
         filled, boxes = 0, []
+        # Blurred levels with their columns sorted, by octave and step: sizes share them.
+        sorted_levels: dict[tuple[int, int], np.ndarray] = {}
         for size in active:
             start = filled
+            level = frame.level(size.octave)
+            key = size.octave, int(size.grid[2]) * stride
+            if key not in sorted_levels:
+                sorted_levels[key] = deinterleave(level.blurred, key[1])
             sparse = (stride, self.phase)
-            filled = self._scan_size(frame, size, around, threshold, sparse, start)
+            filled = self._scan_size(level, sorted_levels[key], size, around, threshold, sparse, start)
             boxes.append(size.boxes(self._corners[start:filled]))
         order = np.argsort(-self._confidences[:filled], kind="stable")
         return Candidates(
@@ -123,7 +129,8 @@ class Detector:
 
     def _scan_size(
         self,
-        frame: Frame,
+        level: Level,
+        pixels: np.ndarray,
         size: WindowSize,
         around: Box,
         threshold: float,
@@ -131,7 +138,6 @@ class Detector:
         filled: int,
     ) -> int:
         """Scan the windows of one size; returns the number of rows filled so far, see `scan_windows`."""
-        level = frame.level(size.octave)
         if level.gray.shape[0] < size.grid[1] or level.gray.shape[1] < size.grid[0]:
             return filled
         integral, squares = level.integrals
@@ -142,7 +148,7 @@ class Detector:
             (around.y + around.height) / size.factor,
         )
         return scan_windows(
-            level.columns(int(size.grid[2]) * sparse[0]),
+            pixels,
             integral,
             squares,
             size.grid,

@@ -10,8 +10,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tld_follower.tld.scanning import deinterleave
-
 PATCH_SIDE = 15
 PATCH_SIZE = PATCH_SIDE * PATCH_SIDE
 
@@ -50,19 +48,12 @@ class Level:
     def __init__(self, gray: NDArray[np.uint8], blur: float) -> None:
         self.gray = gray
         self._blur = blur
-        self._columns: dict[int, NDArray[np.uint8]] = {}
 
     @cached_property
     def blurred(self) -> NDArray[np.uint8]:
         """The blurred copy (H, W): to a grey level cv2.GaussianBlur's, in less than half the time."""
         kernel = cv2.getGaussianKernel(2 * round(3.0 * self._blur) + 1, self._blur)
         return cv2.sepFilter2D(self.gray, -1, kernel, kernel)
-
-    def columns(self, step: int) -> NDArray[np.uint8]:
-        """Return the blurred copy's columns sorted for windows `step` pixels apart; see `deinterleave`."""
-        if step not in self._columns:
-            self._columns[step] = deinterleave(self.blurred, step)
-        return self._columns[step]
 
     @cached_property
     def integrals(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:

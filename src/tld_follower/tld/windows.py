@@ -62,7 +62,7 @@ def window_sizes(box: Box, comparisons: np.ndarray, parameters: Parameters) -> l
         octave = max(0, int(np.floor(np.log2(np.sqrt(width * height) / parameters.window_side))))
         factor = 1 << octave
         level_w, level_h = max(width / factor, 2.0), max(height / factor, 2.0)
-        steps = float(max(round(parameters.shift * level_w), 1)), max(parameters.shift * level_h, 1.0)
+        steps = float(max(int(parameters.shift * level_w), 1)), max(parameters.shift * level_h, 1.0)
         grid = (level_w, level_h, *steps)
         offsets = pixel_offsets(comparisons, round(level_w), round(level_h))
         sizes.append(WindowSize(width, height, octave, factor, grid, offsets))

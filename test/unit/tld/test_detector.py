@@ -45,7 +45,7 @@ def test_finds_the_target_elsewhere_and_larger(scene, place):
         detector = trained(scene, seed=seed)
         clusters = detector.clusters(detector.detect(frame, TARGET, 4))
         assert len(clusters) == 1
-        assert clusters[0].confidence > detector.nn_threshold
+        assert detector.accepts(clusters[0].confidence)
         overlap.append(clusters[0].box.overlap(place))
     assert min(overlap) > 0.5
     assert np.mean(overlap) > 0.7
