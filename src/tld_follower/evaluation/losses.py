@@ -109,9 +109,9 @@ def _wall_through(draw, _seed):
 
 
 def escape(seed):
-    """Let the target leave the view: sideways, by a sharp turn, past or below the drone, or under cover."""
+    """Let the target leave the view: under cover, past the drone, by a sharp turn, below it, or sideways."""
     draw = Draw("escape", seed)
-    return (_sideways, _sharp_turn, _past, _cover, _under)[seed % 5](draw)
+    return (_cover, _past, _sharp_turn, _under, _sideways)[seed % 5](draw)
 
 
 def _open_escape(draw, drone, legs):
