@@ -17,11 +17,10 @@ _FOOTPRINT = np.array(
 )
 
 
-def husky_gap(obstacle, pose, t):
-    """Return the gap between a Husky at a pose and an obstacle, in m from above."""
+def husky_footprint(pose):
+    """Return points (N, 2) all over what a Husky at a pose covers, seen from above, in m."""
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    covered = _FOOTPRINT @ np.array([[cos, sin], [-sin, cos]]) + (pose.x, pose.y)
-    return float(obstacle.distance(covered, t).min())
+    return _FOOTPRINT @ np.array([[cos, sin], [-sin, cos]]) + (pose.x, pose.y)
 
 
 def _blocked(obstacle, t, eye, points):
