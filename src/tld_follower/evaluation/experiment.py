@@ -96,6 +96,7 @@ def launch_arguments(settings, plan, seed, distance, folder):
     """Arguments of follow.launch for one run; writes its world into `folder`."""
     return {
         **simulation_arguments(plan, seed, settings.resolution, settings.image_noise, folder, settings.world),
+        "vehicle": plan.vehicle,
         "distance": distance,
         "control": settings.control,
         "max_speed": settings.max_speed,

@@ -33,6 +33,9 @@ _SETTINGS = (
     *("resolution", "world", "image_noise"),
 )
 
+# What the plots of distance, velocity and path are called: by the thesis' figures where it has them.
+_NUMBERS = {"box": ("4.3", "velocity", "path"), "stereo": ("4.5", "4.6", "path")}
+
 
 def rows(result):
     """Return the cells of a result's table: a header, a row a run, and the worst and mean of several."""
@@ -130,6 +133,22 @@ def claims(result):
     ]
 
 
+def _draw(result, directory):
+    """Draw a result; returns a dict of files and captions, by the figure of the thesis or by name."""
+    scenario, distance = result["scenario"], result["distance"]
+    flown = [run for run in result["runs"] if "error" not in run]
+    plan = SCENARIOS[scenario](flown[0]["seed"])
+    title = f"{scenario}: {result['control']} control, distance from {distance}, at most {result['max_speed']} m/s"
+    names = ("distance", "velocity", "path")
+    files = [directory / f"{name}_{distance}.png" for name in names]
+    plots.plot_distance(flown, plan.drive_s, title, files[0])
+    plots.plot_velocity(flown[0], plan.drive_s, title, files[1])
+    plots.plot_path(flown[0], plan, title, files[2])
+    captions = ("Distance to the target", "Velocities along the drone's heading", "From above")
+    numbers = _NUMBERS[distance] if scenario == "straight" else names
+    return dict(zip(numbers, zip(files, captions, strict=True), strict=True))
+
+
 def write(results, directory, videos):
     """Write the page report.html and its plots.
 
@@ -149,6 +168,7 @@ def write(results, directory, videos):
     scenario = results[0]["scenario"]
     page = Page(f"Experiment {scenario}")
     page.text(SCENARIOS[scenario].__doc__.splitlines()[0])
+    drawn = [_draw(result, directory) for result in results]
     if scenario == "straight":
         page.heading("What the thesis says, and what was measured")
         said = [
@@ -157,33 +177,22 @@ def write(results, directory, videos):
             for figure, *rest in claims(result)
         ]
         page.table([["figure, distance", "thesis, sections 4.2 and 4.3", "measured"], *said])
-    for result in results:
-        distance = result["distance"]
-        flown = [run for run in result["runs"] if "error" not in run]
-        plan = SCENARIOS[scenario](flown[0]["seed"])
-        title = (
-            f"{scenario}: {result['control']} control, distance from {distance}, "
-            f"at most {result['max_speed']} m/s"
-        )
-        page.heading(f"Distance from {distance}")
-        files = [directory / f"{name}_{distance}.png" for name in ("distance", "velocity", "path")]
-        plots.plot_distance(flown, plan.drive_s, title, files[0])
-        plots.plot_velocity(flown[0], plan.drive_s, title, files[1])
-        plots.plot_path(flown[0], plan, title, files[2])
-        captions = ("Distance to the target", "Velocities along the drone's heading", "From above")
-        figures = {"box": ("4.3", None), "stereo": ("4.5", "4.6")}[distance] if scenario == "straight" else ()
         numbered = [
-            f"{text} (thesis figure {number})" if number else text
-            for text, number in zip(captions, (*figures, None, None, None), strict=False)
+            (path, f"{caption} (thesis figure {number})")
+            for figures in drawn
+            for number, (path, caption) in figures.items()
+            if number[0] == "4"
         ]
-        page.figures(zip(files, numbered, strict=True))
+        page.figures(numbered)
+        drawn = [{name: shown for name, shown in figures.items() if name[0] != "4"} for figures in drawn]
+    for result, figures in zip(results, drawn, strict=True):
+        distance = result["distance"]
+        page.heading(f"Distance from {distance}")
+        page.figures(figures.values())
         page.table(rows(result))
         page.notes(remarks(result))
         if distance in videos:
-            page.video(
-                videos[distance],
-                f"Left camera, seed {flown[0]['seed']}: found box green, true box white",
-            )
+            page.video(videos[distance], "Left camera, the first flight: found box green, true box white")
     page.heading("Settings")
     page.table(
         [

@@ -75,7 +75,7 @@ def plot_velocity(run, drive_s, title, path):
     axes.plot(trace["t"], np.array(trace["command"])[:, 0], color="#9aa5ad", linewidth=0.8, label="command")
     axes.plot(trace["t"], target, color=INK, linewidth=1.5, label="target")
     axes.plot(trace["t"], drone, color=FOUND, linewidth=1.5, label="follower")
-    axes.legend(loc="lower right", frameon=False)
+    axes.legend(loc="center", frameon=False)
     _save(figure, path)
 
 
