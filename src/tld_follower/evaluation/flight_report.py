@@ -138,7 +138,10 @@ def _draw(result, directory):
     scenario, distance = result["scenario"], result["distance"]
     flown = [run for run in result["runs"] if "error" not in run]
     plan = SCENARIOS[scenario](flown[0]["seed"])
-    title = f"{scenario}: {result['control']} control, distance from {distance}, at most {result['max_speed']} m/s"
+    title = (
+        f"{scenario}: {result['control']} control, distance from {distance}, "
+        f"at most {result['max_speed']} m/s"
+    )
     names = ("distance", "velocity", "path")
     files = [directory / f"{name}_{distance}.png" for name in names]
     plots.plot_distance(flown, plan.drive_s, title, files[0])
