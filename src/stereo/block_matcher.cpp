@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <limits>
 
-// Compiled for AVX2 and for any x86-64; the loader takes what the processor has.
+// Compiled for AVX2, SSE4.1 and any x86-64; the loader takes what the processor has.
 #if defined(__x86_64__) && defined(__gnu_linux__)
-#define TLD_VECTORISED __attribute__((target_clones("avx2", "default")))
+#define TLD_VECTORISED __attribute__((target_clones("avx2", "sse4.1", "default")))
 #else
 #define TLD_VECTORISED
 #endif
@@ -17,7 +17,7 @@
 namespace tld_follower::stereo {
 namespace {
 
-constexpr int kLanes = 16;    // Disparities at a time.
+constexpr int kLanes = 8;     // Disparities at a time.
 constexpr int kColumns = 32;  // Columns at a time: their sums stay in the fastest cache.
 
 // So many numbers, anywhere in memory; the compiler makes vector instructions of their operators.
@@ -66,12 +66,10 @@ struct Candidates {
 // Folds the lanes onto each other with an operator, and returns what is left.
 template <typename Number, typename Operator>
 TLD_INLINE Number Folded(Lanes<Number> v, Operator combine) {
-  static_assert(kLanes == 16);
-  v = combine(v,
-              __builtin_shufflevector(v, v, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7));
-  v = combine(v, __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3));
-  v = combine(v, __builtin_shufflevector(v, v, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1));
-  v = combine(v, __builtin_shufflevector(v, v, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0));
+  static_assert(kLanes == 8);
+  v = combine(v, __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3));
+  v = combine(v, __builtin_shufflevector(v, v, 2, 3, 0, 1, 2, 3, 0, 1));
+  v = combine(v, __builtin_shufflevector(v, v, 1, 0, 1, 0, 1, 0, 1, 0));
   return v[0];
 }
 
