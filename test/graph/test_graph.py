@@ -37,7 +37,10 @@ TABLE = {
     "/NODE": (["/stereo/left/image_raw", "/NODE/init"], ["/pointA", "/NODE/view"]),
     "/stamp": (["/pointA"], ["/pointstampA"]),
     "/stereo/stereo_image_proc": (CAMERAS, ["/stereo/disparity", "/stereo/points2"]),
-    "/pointsdepthA": (["/pointstampA", "/stereo/points2"], ["/cmd_vel", "/pointsdepthA/state"]),
+    "/pointsdepthA": (
+        ["/pointstampA", "/stereo/points2", "/spiri/odometry"],
+        ["/cmd_vel", "/pointsdepthA/state"],
+    ),
     "/teleop_twist_keyboard": ([], ["/husky/cmd_vel"]),
     "/husky/robot_state_publisher": (["/husky/joint_states"], ["/tf"]),
 }

@@ -24,6 +24,7 @@ FLYING_EDGES = frozenset(
         ("/NODE", "/pointA", "/stamp"),
         ("/stamp", "/pointstampA", "/pointsdepthA"),
         ("/stereo/stereo_image_proc", "/stereo/points2", "/pointsdepthA"),
+        ("/gazebo", "/spiri/odometry", "/pointsdepthA"),
         ("/pointsdepthA", "/cmd_vel", "/gazebo"),
         ("/teleop_twist_keyboard", "/husky/cmd_vel", "/gazebo"),
         ("/gazebo", "/husky/joint_states", "/husky/robot_state_publisher"),

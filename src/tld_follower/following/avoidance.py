@@ -14,10 +14,14 @@ _STRIDE = 2
 
 @dataclass(frozen=True)
 class Nearest:
-    """The nearest thing in view: distance [m] and angle below the horizon [rad]; NaN if unknown."""
+    """The nearest thing in view: distance [m], angle below the horizon [rad] (NaN if unknown), and place.
+
+    The place is a point of the optical frame, metres; None if unknown.
+    """
 
     distance: float = math.nan
     below: float = math.nan
+    point: np.ndarray | None = None
 
 
 class Avoidance:
@@ -43,9 +47,10 @@ class Avoidance:
         if squares.size <= passed_over:
             return Nearest()
         order = np.argpartition(squares, passed_over)
-        x, y, z = points[order[: passed_over + 1]].mean(axis=0)
+        point = points[order[: passed_over + 1]].mean(axis=0)
+        x, y, z = point
         below = self._p.camera_pitch + math.atan2(y, math.hypot(x, z))
-        return Nearest(math.sqrt(squares[order[passed_over]]), below)
+        return Nearest(math.sqrt(squares[order[passed_over]]), below, point)
 
     def retreat(self, nearest):
         """Return the `Command` that leads away from what is nearer than the minimum, or None.

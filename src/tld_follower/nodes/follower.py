@@ -4,18 +4,19 @@ import math
 
 import rospy
 from geometry_msgs.msg import Twist, Vector3
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import PointCloud2
 
+from tld_follower.following import local_map
 from tld_follower.following.follower import Follower
 from tld_follower.following.parameters import Parameters
 from tld_follower.msg import BoundingBoxStamped, FollowState
 from tld_follower.nodes.by_stamp import ByStamp
 from tld_follower.nodes.conversions import cloud_points, message_box
+from tld_follower.nodes.history import History
 from tld_follower.nodes.memory import keep_memory
 from tld_follower.nodes.newest import Newest
 from tld_follower.nodes.settings import fatal_if_wrong
-
-_UNKNOWN_VELOCITY = Vector3(math.nan, math.nan, math.nan)
 
 
 def twist(command):
@@ -33,7 +34,10 @@ class FollowerNode:
 
     def __init__(self):
         self._parameters = Parameters.from_dict(rospy.get_param("~", {}))
+        if self._parameters.control == "predictive":
+            local_map.warm_up()
         self._follower = Follower(self._parameters)
+        self._odometry = History()
         self._boxes = Newest()
         self._clouds = ByStamp(self._parameters.max_age)
         self._stamp = rospy.Time()
@@ -43,6 +47,7 @@ class FollowerNode:
         self._command = rospy.Publisher("/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
         self._state = rospy.Publisher("~state", FollowState, queue_size=10, tcp_nodelay=True)
         rospy.Subscriber("/stereo/points2", PointCloud2, self._clouds.put, queue_size=1, tcp_nodelay=True)
+        rospy.Subscriber("odometry", Odometry, self._odometry.put, queue_size=50, tcp_nodelay=True)
         rospy.Subscriber("/pointstampA", BoundingBoxStamped, self._boxes.put, queue_size=1, tcp_nodelay=True)
 
     def run(self):
@@ -71,17 +76,33 @@ class FollowerNode:
         self._stamp = stamp
         cloud = self._clouds.wait(stamp, self._parameters.cloud_wait, lambda: self._boxes.waiting)
         cloud = cloud or self._clouds.newest
-        now = rospy.Time.now()
-        points, cloud_age = None, math.inf
+        points, cloud_stamp = None, -math.inf
         if cloud is not None:
-            points, cloud_age = self._points(cloud), (now - cloud.header.stamp).to_sec()
+            points, cloud_stamp = self._points(cloud), cloud.header.stamp.to_sec()
+        for odometry in self._odometry.take(stamp, self._parameters.cloud_wait, lambda: self._boxes.waiting):
+            self._add_odometry(odometry)
         try:
             box = message_box(message.box)
         except ValueError as error:
             rospy.logerr_throttle_identical(5.0, f"box ignored: {error}")
             box = None
-        state = self._follower.update(box, message.box.target, (now - stamp).to_sec(), points, cloud_age)
+        # The clock's message may be handled after the image's, though it was sent before.
+        now = max(rospy.Time.now(), stamp).to_sec()
+        state = self._follower.update(box, message.box.target, stamp.to_sec(), now, points, cloud_stamp)
         self._publish(message.header, state)
+
+    def _add_odometry(self, message):
+        pose, velocity = message.pose.pose, message.twist.twist.linear
+        place, turn = pose.position, pose.orientation
+        try:
+            self._follower.add_odometry(
+                message.header.stamp.to_sec(),
+                (place.x, place.y, place.z),
+                (turn.x, turn.y, turn.z, turn.w),
+                (velocity.x, velocity.y, velocity.z),
+            )
+        except ValueError as error:
+            rospy.logerr_throttle_identical(5.0, f"odometry ignored: {error}")
 
     def _points(self, cloud):
         try:
@@ -110,7 +131,7 @@ class FollowerNode:
                 reason=state.reason,
                 distance=state.distance,
                 nearest_obstacle=state.nearest_obstacle,
-                target_velocity=_UNKNOWN_VELOCITY,
+                target_velocity=Vector3(*state.target_velocity),
                 command=command,
             )
         )

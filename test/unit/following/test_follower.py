@@ -15,7 +15,9 @@ from tld_follower.following.controller import HOVER
 from tld_follower.following.follower import Follower, Mode
 from tld_follower.following.parameters import Parameters
 
-PARAMETERS = Parameters(image_width=320, image_height=240, max_speed=1.0)
+PARAMETERS = Parameters(
+    control="thesis", image_width=320, image_height=240, max_speed=1.0, max_yaw_rate=1.0, max_slew=1e6
+)
 CENTRE = Box(130, 95, 60, 50)
 
 
@@ -28,7 +30,8 @@ def scene(target, background=4.0):
 
 
 def step(follower, box=CENTRE, cloud=None, target=1, box_age=0.02, cloud_age=0.02):
-    return follower.update(box, target, box_age, cloud, cloud_age)
+    now = follower.now = getattr(follower, "now", 100.0) + 1 / 30
+    return follower.update(box, target, now - box_age, now, cloud, now - cloud_age)
 
 
 def test_waits_until_a_target_was_seen():

@@ -1,0 +1,161 @@
+"""The predictive follower: keeps track of target and obstacles in the odom frame, seen or not."""
+
+import math
+
+import numpy as np
+
+from tld_follower.following.avoidance import Avoidance
+from tld_follower.following.camera import Camera
+from tld_follower.following.controller import Command
+from tld_follower.following.distance import make_distance
+from tld_follower.following.local_map import LocalMap
+from tld_follower.following.own_motion import level
+from tld_follower.following.predictive import PredictiveController
+from tld_follower.following.safe_motion import SafeMotion
+from tld_follower.following.search import Search
+from tld_follower.following.state import Mode, State
+from tld_follower.following.target_filter import TargetFilter
+
+_MAP_INTERVAL = 0.06  # s between clouds that are entered into the map
+_NEAR_FRAMES = 2  # a lone wrong match is not in two images
+
+
+class PredictivePilot:
+    """Follows by prediction, flies only where it is safe, and searches a lost target."""
+
+    def __init__(self, parameters, own_motion):
+        self._p = parameters
+        self._own = own_motion
+        self._camera = Camera.of(parameters)
+        self._controller = PredictiveController(parameters)
+        self._nearest = Avoidance(parameters).nearest
+        self._safe = SafeMotion(parameters)
+        self._map = LocalMap(parameters)
+        self._mapped = -math.inf
+        self._near = 0  # images on end with something near
+        self.take_target()
+
+    def take_target(self):
+        """Start afresh for another target."""
+        self._distance = make_distance(self._p)
+        self._filter = TargetFilter(self._p)
+        self._ranged = -math.inf  # when the distance was measured last
+        self._seen = -math.inf
+        self._search = None
+        self._gave_up = False
+
+    def decide(self, scene):
+        """Return the `State` for one `Scene`."""
+        nearest = self._nearest(scene.cloud)
+        obstacles = self._remember(scene)
+        if self._p.distance == "stereo" and scene.cloud is None:
+            return State(Mode.WAITING, "no fresh point cloud")
+        if scene.box is not None:
+            mode, reason, distance, velocity, yaw_rate, threatened = self._follow(scene)
+        else:
+            mode, reason, velocity, yaw_rate = self._recover(scene, obstacles)
+            distance, threatened = math.nan, False
+        command, hindrance = self._fly(velocity, yaw_rate, scene, nearest, obstacles, threatened)
+        if hindrance.startswith("something"):
+            mode = Mode.AVOIDING
+        return State(
+            mode, hindrance or reason, distance, nearest.distance, command, self._target_velocity(scene)
+        )
+
+    def _follow(self, scene):
+        p = self._p
+        if scene.stamp - self._seen > p.max_age:
+            self._filter = TargetFilter(p)
+        self._seen, self._search, self._gave_up = scene.stamp, None, False
+        box = scene.box
+        centre = self._camera.centre(scene.then)
+        ray = scene.then.attitude @ self._camera.ray(box.x + box.width / 2, box.y + box.height / 2)
+        expected = math.nan
+        if self._filter.started:
+            expected = float(np.linalg.norm(self._filter.at(scene.stamp)[0] - centre))
+        distance = self._distance.measure(box, scene.cloud, expected)
+        if self._filter.update(scene.stamp, centre, ray, distance):
+            self._ranged = scene.stamp
+        yaw_only = Command(yaw=self._turn_to(ray, scene))
+        if not self._filter.started or scene.now - self._ranged > p.max_age:
+            return Mode.FOLLOWING, "no depth inside the box", distance, np.zeros(3), yaw_only.yaw, False
+        position, velocity = self._filter.at(scene.now)
+        command = self._controller.command(position, velocity, scene.present, self._camera)
+        wanted = level(scene.present.yaw) @ [command.x, command.y, command.z]
+        sight = position - self._camera.centre(scene.present)
+        away = float(np.linalg.norm(sight))
+        closing = -float((velocity - scene.present.velocity) @ sight) / max(away, 1e-3)
+        threatened = away < p.set_distance and away - p.minimum_distance < closing * p.threat_time
+        return Mode.FOLLOWING, "the target is in view", distance, wanted, command.yaw, threatened
+
+    def _turn_to(self, ray, scene):
+        sight = level(scene.then.yaw).T @ ray
+        rate = self._p.yaw_gain * math.atan2(sight[1], sight[0])
+        return min(max(rate, -self._p.max_yaw_rate), self._p.max_yaw_rate)
+
+    def _recover(self, scene, obstacles):
+        still = (np.zeros(3), 0.0)
+        if self._gave_up:
+            return Mode.LOST, "the search has ended in vain", *still
+        if not self._filter.started or self._p.search_time <= 0:
+            return Mode.LOST, "the target is not in view", *still
+        if scene.now - self._seen < self._p.lost_hover:
+            return Mode.LOST, "the target has just been lost", *still
+        if self._search is None:
+            self._search = self._begin_search(scene)
+        wish = self._search.step(scene.now, scene.present, self._camera, obstacles, self._safe)
+        if wish is None:
+            self._gave_up = True
+            return self._recover(scene, obstacles)
+        return Mode.SEARCHING, wish.phase.value, wish.velocity, wish.yaw_rate
+
+    def _begin_search(self, scene):
+        position, velocity = self._filter.at(self._seen)
+        sight = level(scene.present.yaw).T @ (position + velocity - self._camera.centre(scene.present))
+        return Search(self._p, self._seen, position, velocity, math.atan2(sight[1], sight[0]))
+
+    def _remember(self, scene):
+        """Enter the cloud into the map; return what is to be kept away from, ndarray (n, 3), odom frame."""
+        self._map.move(scene.present.position)
+        self._map.pass_through(scene.present)
+        if scene.cloud is None:
+            return self._map.obstacles(scene.now)
+        if scene.cloud_stamp - self._mapped > _MAP_INTERVAL or scene.cloud_stamp < self._mapped:
+            self._mapped = scene.cloud_stamp
+            self._map.add(scene.cloud, self._camera, scene.cloud_then, self._body(scene))
+        return self._map.obstacles(scene.now)
+
+    def _body(self, scene):
+        """Return the ball that holds the target, which is no obstacle: middle and radius; or None."""
+        if scene.box is None or not self._filter.started:
+            return None
+        surface = self._filter.at(scene.cloud_stamp)[0]
+        sight = surface - self._camera.centre(scene.cloud_then)
+        distance = float(np.linalg.norm(sight))
+        radius = self._p.target_radius * math.hypot(scene.box.width, scene.box.height) / 2
+        radius *= distance / self._camera.focal_length
+        return surface + sight / distance * radius * 0.5, radius
+
+    def _fly(self, velocity, yaw_rate, scene, nearest, obstacles, threatened):
+        """Make a wanted velocity (odom frame) safe; return the command and what hinders it."""
+        present = scene.present
+        reason = ""
+        if scene.cloud is not None:
+            self._near = (
+                self._near + 1 if nearest.distance < self._p.minimum_distance + self._p.near_margin else 0
+            )
+            if self._near >= _NEAR_FRAMES:
+                place = self._camera.centre(scene.cloud_then) + scene.cloud_then.attitude @ (
+                    self._camera.to_body @ nearest.point
+                )
+                obstacles = np.vstack([obstacles, place])
+            heading = level(present.yaw)[:, 0]
+            way = self._safe.choose(velocity, present.position, heading, self._map, obstacles, threatened)
+            velocity, reason = way.velocity, way.reason
+        x, y, z = level(present.yaw).T @ velocity
+        return Command(float(x), float(y), float(z), float(yaw_rate)), reason
+
+    def _target_velocity(self, scene):
+        if not self._filter.started or scene.now - self._seen > self._p.max_age:
+            return (math.nan,) * 3
+        return tuple(map(float, level(scene.present.yaw).T @ self._filter.at(scene.now)[1]))
