@@ -71,6 +71,8 @@ class Flight:
             edges.remove(COMMAND_EDGE)
         if self._plan.target_robot != "husky":
             edges = {edge for edge in edges if not edge[1].startswith("/husky/")}
+        if self._plan.vehicle == "ugv":
+            edges = {(a, topic.replace("/spiri/odometry", "/ugv/odometry"), b) for a, topic, b in edges}
         self._stage.wait_until_connected(edges, alive)
 
     def fly(self, alive=lambda: None):
