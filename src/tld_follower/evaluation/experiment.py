@@ -99,7 +99,6 @@ def launch_arguments(settings, plan, seed, distance, folder):
         "vehicle": plan.vehicle,
         "distance": distance,
         "control": settings.control,
-        "vehicle": plan.vehicle,
         "max_speed": settings.max_speed,
         "tracker": settings.tracker,
         "use_depth": str(settings.use_depth).lower(),
