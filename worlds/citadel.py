@@ -68,8 +68,8 @@ def write(directory):
         "citadel.py",
         f"A hill of {TOP:g} m; a road climbs along y = 0 to a gate in the walls on its top.",
     )
-    world.ground(0, -0.02)
     world.terrain("citadel_height", (SIZE, SIZE, 1.5 * TOP), "citadel_map")
+    world.ground(0, -0.02)
     world.robot("spiri", "spiri", -31.0, 0, 0.0405)
     world.robot("husky", "husky", -29.5, 0, 0.1325)
     sunk = TOP - 0.3  # The feet of the walls stand in the ground.

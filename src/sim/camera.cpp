@@ -26,6 +26,14 @@ btTransform StereoCamera::Optical(Eye eye) const {
   return btTransform(optical, btVector3(0, eye == Eye::kLeft ? half : -half, 0));
 }
 
+bool StereoCamera::Sees(const btVector3& centre, double radius) const {
+  const double tan_x = width / 2.0 / FocalLength(), tan_y = height / 2.0 / FocalLength();
+  // Distances from the planes through the image's edges.
+  return centre.z() > near - radius &&
+         std::abs(centre.x()) - centre.z() * tan_x < radius * std::hypot(1, tan_x) &&
+         std::abs(centre.y()) - centre.z() * tan_y < radius * std::hypot(1, tan_y);
+}
+
 std::array<float, 16> StereoCamera::Projection() const {
   // OpenGL's y grows with the row in memory, as does v; cx and cy lie in the middle of the image.
   const double fx = 2 * FocalLength() / width;

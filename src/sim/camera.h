@@ -35,6 +35,9 @@ struct StereoCamera {
   /// Pose of an eye's optical frame in the mount's frame.
   btTransform Optical(Eye eye) const;
 
+  /// Whether part of a sphere about `centre` (optical frame) may be in the image.
+  bool Sees(const btVector3& centre, double radius) const;
+
   /// OpenGL projection of optical coordinates to clip space, column major. Image row 0 becomes the
   /// first row in memory, so that no flip is needed after reading back.
   std::array<float, 16> Projection() const;

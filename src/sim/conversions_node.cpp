@@ -2,7 +2,6 @@
 #include "sim/conversions_node.h"
 
 #include <sensor_msgs/distortion_models.h>
-#include <sensor_msgs/image_encodings.h>
 
 namespace tld_follower::sim {
 
@@ -81,18 +80,6 @@ sensor_msgs::CameraInfo ToCameraInfo(const StereoCamera& camera, Eye eye,
   info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   info.P = {f, 0, cx, shift, 0, f, cy, 0, 0, 0, 1, 0};
   return info;
-}
-
-sensor_msgs::Image ToImage(const sensor_msgs::CameraInfo& info,
-                           const std::vector<uint8_t>& pixels) {
-  sensor_msgs::Image image;
-  image.header = info.header;
-  image.width = info.width;
-  image.height = info.height;
-  image.encoding = sensor_msgs::image_encodings::RGB8;
-  image.step = 3 * info.width;
-  image.data = pixels;
-  return image;
 }
 
 }  // namespace tld_follower::sim

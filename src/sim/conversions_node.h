@@ -32,7 +32,19 @@ nav_msgs::Odometry ToGroundTruth(const Body& body, const ros::Time& stamp,
 /// right one holds -f * baseline (sensor_msgs/CameraInfo).
 sensor_msgs::CameraInfo ToCameraInfo(const StereoCamera& camera, Eye eye, const std::string& frame);
 
-/// An rgb8 image.
-sensor_msgs::Image ToImage(const sensor_msgs::CameraInfo& info, const std::vector<uint8_t>& pixels);
+/// An image of whole rows, of the camera that `info` describes.
+template <typename Value>
+sensor_msgs::Image ToImage(const sensor_msgs::CameraInfo& info, const std::string& encoding,
+                           const std::vector<Value>& pixels) {
+  sensor_msgs::Image image;
+  image.header = info.header;
+  image.width = info.width;
+  image.height = info.height;
+  image.encoding = encoding;
+  image.step = uint32_t(pixels.size() * sizeof(Value) / info.height);
+  const auto* bytes = reinterpret_cast<const uint8_t*>(pixels.data());
+  image.data.assign(bytes, bytes + pixels.size() * sizeof(Value));
+  return image;
+}
 
 }  // namespace tld_follower::sim

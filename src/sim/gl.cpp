@@ -4,6 +4,7 @@
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdlib>
 #include <stdexcept>
@@ -70,10 +71,10 @@ void GlContext::MakeCurrent() const {
   }
 }
 
-GlProgram::GlProgram(const char* vertex_source, const char* fragment_source)
+GlProgram::GlProgram(const std::string& vertex_source, const std::string& fragment_source)
     : id_(glCreateProgram()) {
-  const GLuint vertex = Compile(GL_VERTEX_SHADER, vertex_source);
-  const GLuint fragment = Compile(GL_FRAGMENT_SHADER, fragment_source);
+  const GLuint vertex = Compile(GL_VERTEX_SHADER, vertex_source.c_str());
+  const GLuint fragment = Compile(GL_FRAGMENT_SHADER, fragment_source.c_str());
   glAttachShader(id_, vertex);
   glAttachShader(id_, fragment);
   glLinkProgram(id_);
@@ -120,10 +121,26 @@ GlMesh::GlMesh(const Mesh& mesh) : count_(GLsizei(mesh.indices.size())) {
     glVertexAttribPointer(i, attributes[i].first, GL_FLOAT, GL_FALSE, sizeof(Vertex),
                           reinterpret_cast<const void*>(attributes[i].second));
   }
+  const size_t length = mesh.piece > 0 ? mesh.piece : mesh.indices.size();
+  for (size_t first = 0; first < mesh.indices.size(); first += length) {
+    const size_t last = std::min(first + length, mesh.indices.size());
+    const auto corner = [&mesh](size_t i) {
+      const float* p = mesh.vertices[mesh.indices[i]].position;
+      return btVector3(p[0], p[1], p[2]);
+    };
+    btVector3 low = corner(first), high = low;
+    for (size_t i = first; i < last; ++i) {
+      low.setMin(corner(i));
+      high.setMax(corner(i));
+    }
+    pieces_.push_back(
+        {GLsizei(first), GLsizei(last - first), (low + high) / 2, (high - low).length() / 2});
+  }
 }
 
 GlMesh::GlMesh(GlMesh&& other) noexcept
-    : array_(std::exchange(other.array_, 0)),
+    : pieces_(std::move(other.pieces_)),
+      array_(std::exchange(other.array_, 0)),
       vertices_(std::exchange(other.vertices_, 0)),
       indices_(std::exchange(other.indices_, 0)),
       count_(other.count_) {}
@@ -134,9 +151,10 @@ GlMesh::~GlMesh() {
   glDeleteBuffers(1, &indices_);
 }
 
-void GlMesh::Draw() const {
+void GlMesh::DrawPiece(const Piece& piece) const {
   glBindVertexArray(array_);
-  glDrawElements(GL_TRIANGLES, count_, GL_UNSIGNED_INT, nullptr);
+  glDrawElements(GL_TRIANGLES, piece.count, GL_UNSIGNED_INT,
+                 reinterpret_cast<const void*>(size_t(piece.first) * sizeof(uint32_t)));
 }
 
 GlFramebuffer::GlFramebuffer(int width, int height) {

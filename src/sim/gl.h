@@ -4,8 +4,10 @@
 
 #include <GL/glcorearb.h>
 
+#include <algorithm>
 #include <array>
 #include <string>
+#include <vector>
 
 #include "sim/mesh.h"
 
@@ -37,7 +39,7 @@ class GlContext {
 class GlProgram {
  public:
   /// Throws std::runtime_error with the compiler's message.
-  GlProgram(const char* vertex_source, const char* fragment_source);
+  GlProgram(const std::string& vertex_source, const std::string& fragment_source);
   ~GlProgram();
   GlProgram(const GlProgram&) = delete;
   GlProgram& operator=(const GlProgram&) = delete;
@@ -60,10 +62,31 @@ class GlMesh {
   GlMesh(GlMesh&& other) noexcept;
   GlMesh& operator=(GlMesh&&) = delete;
 
-  void Draw() const;
+  /// Draws the pieces for whose bounding sphere `sees(centre, radius)` holds, in the mesh's frame.
+  template <typename Predicate>
+  void Draw(Predicate sees) const {
+    for (const Piece& piece : pieces_) {
+      if (sees(piece.centre, piece.radius)) DrawPiece(piece);
+    }
+  }
+  /// Whether Draw() would draw something.
+  template <typename Predicate>
+  bool AnyPiece(Predicate sees) const {
+    return std::any_of(pieces_.begin(), pieces_.end(),
+                       [&](const Piece& piece) { return sees(piece.centre, piece.radius); });
+  }
   int triangles() const { return count_ / 3; }
 
  private:
+  struct Piece {
+    GLsizei first, count;
+    btVector3 centre;
+    btScalar radius;
+  };
+
+  void DrawPiece(const Piece& piece) const;
+
+  std::vector<Piece> pieces_;
   GLuint array_ = 0, vertices_ = 0, indices_ = 0;
   GLsizei count_ = 0;
 };

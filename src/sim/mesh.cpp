@@ -14,6 +14,7 @@ namespace tld_follower::sim {
 namespace {
 
 constexpr int kSides = 24;
+constexpr int kTerrainPiece = 8;  // Cells along the edge of a piece of terrain.
 
 uint32_t Add(const btVector3& p, const btVector3& n, double u, double v, Mesh* mesh) {
   mesh->vertices.push_back({{float(p.x()), float(p.y()), float(p.z())},
@@ -132,14 +133,24 @@ Mesh MakeTerrain(const Terrain& terrain, double tile) {
       mesh.vertices.back().light_uv[1] = 1.f - float(row) / float(terrain.rows - 1);
     }
   }
-  const uint32_t stride = uint32_t(terrain.columns);
-  for (uint32_t row = 0; row + 1 < uint32_t(terrain.rows); ++row) {
-    for (uint32_t column = 0; column + 1 < stride; ++column) {
-      const uint32_t a = row * stride + column, b = a + 1, c = b + stride, d = a + stride;
-      AddTriangle(a, b, d, &mesh);
-      AddTriangle(b, c, d, &mesh);
+  const int stride = terrain.columns;
+  const auto add_cell = [&mesh, stride](int row, int column) {
+    const uint32_t a = uint32_t(row * stride + column), b = a + 1;
+    const uint32_t c = b + uint32_t(stride), d = a + uint32_t(stride);
+    AddTriangle(a, b, d, &mesh);
+    AddTriangle(b, c, d, &mesh);
+  };
+  // Square by square, so that few pieces are in view.
+  for (int south = 0; south < terrain.rows - 1; south += kTerrainPiece) {
+    for (int west = 0; west < terrain.columns - 1; west += kTerrainPiece) {
+      for (int row = south; row < std::min(south + kTerrainPiece, terrain.rows - 1); ++row) {
+        for (int column = west; column < std::min(west + kTerrainPiece, stride - 1); ++column) {
+          add_cell(row, column);
+        }
+      }
     }
   }
+  mesh.piece = 6 * kTerrainPiece * kTerrainPiece;
   return mesh;
 }
 

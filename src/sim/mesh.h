@@ -20,6 +20,9 @@ struct Vertex {
 struct Mesh {
   std::vector<Vertex> vertices;
   std::vector<uint32_t> indices;
+  /// How many indices in a row lie close together; 0 if all of them do. What is not in view is
+  /// left out by such pieces.
+  size_t piece = 0;
 };
 
 /// A primitive with its texture repeating every `texture_size` metres. Each face of a box starts

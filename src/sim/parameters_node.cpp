@@ -81,6 +81,17 @@ void ReadCamera(const ros::NodeHandle& handle, StereoCamera* camera) {
   camera->position = {btScalar(position[0]), btScalar(position[1]), btScalar(position[2])};
 }
 
+void ReadEffects(const ros::NodeHandle& handle, CameraEffects* effects) {
+  std::string shadows = "ground";
+  Read(handle, "shadows", "ground or map", &shadows);
+  if (shadows != "ground" && shadows != "map") Fail("shadows", "ground or map");
+  effects->shadow_map = shadows == "map";
+  ReadNotNegative(handle, "exposure_change", &effects->exposure_change);
+  ReadPositive(handle, "exposure_time", &effects->exposure_time);
+  effects->blur_pictures = ReadWhole(handle, "blur_pictures", effects->blur_pictures);
+  ReadNotNegative(handle, "shutter_time", &effects->shutter_time);
+}
+
 void ReadSpiri(const ros::NodeHandle& handle, SpiriParameters* p) {
   ReadPositive(handle, "spiri/arm", &p->arm);
   ReadPositive(handle, "spiri/motor_constant", &p->motor_constant);
@@ -177,6 +188,7 @@ NodeParameters ReadParameters(const ros::NodeHandle& handle) {
   ReadPlacement(handle, "vehicle_pose", &simulation.cast.vehicle_place);
   ReadPlacement(handle, "target_pose", &simulation.cast.target_place);
   ReadCamera(handle, &simulation.camera);
+  ReadEffects(handle, &simulation.effects);
   ReadSpiri(handle, &simulation.cast.spiri);
   ReadSensors(handle, &simulation.sensors);
   ReadHusky(handle, &simulation.cast.husky);

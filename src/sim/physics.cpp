@@ -2,6 +2,7 @@
 #include "sim/physics.h"
 
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
+#include <LinearMath/btTransformUtil.h>
 
 #include <stdexcept>
 
@@ -12,6 +13,13 @@ namespace {
 constexpr btScalar kMargin = btScalar(0.002);
 
 }  // namespace
+
+btTransform Body::PoseBefore(double seconds) const {
+  btTransform before;
+  btTransformUtil::integrateTransform(rigid->getWorldTransform(), rigid->getLinearVelocity(),
+                                      rigid->getAngularVelocity(), btScalar(-seconds), before);
+  return before * centre_of_mass.inverse();
+}
 
 btVector3 Body::Velocity() const {
   const btVector3 to_origin =

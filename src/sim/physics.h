@@ -18,6 +18,8 @@ struct Body {
 
   /// Pose of the body's own frame in the world.
   btTransform Pose() const { return rigid->getWorldTransform() * centre_of_mass.inverse(); }
+  /// The same so many seconds ago, had its velocities been those of now.
+  btTransform PoseBefore(double seconds) const;
   /// Velocity of the origin of the body's own frame, world axes [m/s].
   btVector3 Velocity() const;
   /// World axes [rad/s].

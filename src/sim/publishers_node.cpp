@@ -6,6 +6,7 @@
 #include <sensor_msgs/Imu.h>
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/Range.h>
+#include <sensor_msgs/image_encodings.h>
 #include <tf2_msgs/TFMessage.h>
 #include <tld_follower/Truth.h>
 
@@ -42,6 +43,8 @@ Publishers::Publishers(ros::NodeHandle handle, ros::NodeHandle private_handle,
       tf_(handle.advertise<tf2_msgs::TFMessage>("/tf", 100)),
       tf_static_(handle.advertise<tf2_msgs::TFMessage>("/tf_static", 1, true)),
       truth_(private_handle.advertise<tld_follower::Truth>("truth", 10)),
+      depth_(private_handle.advertise<sensor_msgs::Image>("depth", 5)),
+      labels_(private_handle.advertise<sensor_msgs::Image>("labels", 5)),
       target_odometry_frame_(simulation.cast().target().name + "_odom"),
       target_frame_(simulation.cast().target().name + "_base_link"),
       left_camera_(ToCameraInfo(simulation.camera(), Eye::kLeft, kOpticalFrame)),
@@ -158,8 +161,23 @@ void Publishers::PublishFrame(Simulation* simulation, const ros::Time& stamp) {
   left_camera_.header.stamp = right_camera_.header.stamp = stamp;
   left_info_.publish(left_camera_);
   right_info_.publish(right_camera_);
-  left_image_.publish(ToImage(left_camera_, images_.left));
-  right_image_.publish(ToImage(right_camera_, images_.right));
+  PublishPictures(simulation);
+}
+
+void Publishers::PublishPictures(Simulation* simulation) {
+  using namespace sensor_msgs::image_encodings;
+  if (depth_.getNumSubscribers() > 0) {
+    std::vector<float> depth;
+    simulation->ReadDepth(&depth);
+    depth_.publish(ToImage(left_camera_, TYPE_32FC1, depth));
+  }
+  if (labels_.getNumSubscribers() > 0) {
+    std::vector<uint8_t> labels;
+    simulation->ReadLabels(&labels);
+    labels_.publish(ToImage(left_camera_, MONO8, labels));
+  }
+  left_image_.publish(ToImage(left_camera_, RGB8, images_.left));
+  right_image_.publish(ToImage(right_camera_, RGB8, images_.right));
 }
 
 void Publishers::PublishRange(Simulation* simulation, const ros::Time& stamp) {

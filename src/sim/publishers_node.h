@@ -36,12 +36,13 @@ class Publishers {
   void PublishSlowTick(const Simulation& simulation, const ros::Time& stamp);
   void PublishFrame(Simulation* simulation, const ros::Time& stamp);
   void PublishRange(Simulation* simulation, const ros::Time& stamp);
+  void PublishPictures(Simulation* simulation);
   void PublishTruth(const Simulation& simulation, const TargetMask& mask, const ros::Time& stamp);
   void TakeTime(const ros::Time& stamp);
 
   ros::Publisher clock_, left_image_, right_image_, left_info_, right_info_, joint_states_;
   ros::Publisher target_odometry_, imu_, range_, odometry_, ground_truth_, target_ground_truth_;
-  ros::Publisher tf_, tf_static_, truth_;
+  ros::Publisher tf_, tf_static_, truth_, depth_, labels_;
   const std::string target_odometry_frame_, target_frame_;
   sensor_msgs::CameraInfo left_camera_, right_camera_;
   StereoImages images_;

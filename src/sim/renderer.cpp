@@ -2,90 +2,24 @@
 #include "sim/renderer.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
+#include "sim/shaders.h"
+
 namespace tld_follower::sim {
 namespace {
 
-// Stencil bits: what is the target, and where a shadow fell already.
-constexpr GLint kTargetBit = 1;
-constexpr GLint kShadowBit = 2;
+// The stencil holds a pixel's label, whether it is ground, and whether a shadow fell on it.
+constexpr GLint kLabelBits = 0x3f, kGroundBit = 0x40, kShadowBit = 0x80;
+static_assert(kLastLabel == kLabelBits);
+constexpr int kSunMapUnit = 2;
+constexpr double kAhead = 5.0;  // What the map of shadows is centred on, before the camera [m].
 constexpr btScalar kFallbackSize = btScalar(0.5);  // Of what stands in for a mesh [m].
 constexpr double kSkyRadius = 100.0;
-
-constexpr const char* kLitVertex = R"(#version 330 core
-layout(location = 0) in vec3 position;
-layout(location = 1) in vec3 normal;
-layout(location = 2) in vec2 uv;
-layout(location = 3) in vec2 light_uv;
-uniform mat4 view;
-uniform mat4 model;
-uniform vec3 colour, ambient, sun_colour, sun_direction;
-out vec3 light;
-out vec2 place;
-out vec2 light_place;
-void main() {
-  vec4 world = model * vec4(position, 1.0);
-  vec3 n = mat3(model) * normal;
-  float sky = 0.6 + 0.4 * n.z;
-  light = colour * (ambient * sky + sun_colour * max(0.0, -dot(n, sun_direction)));
-  place = uv;
-  light_place = light_uv;
-  gl_Position = view * world;
-})";
-
-constexpr const char* kLitFragment = R"(#version 330 core
-in vec3 light;
-in vec2 place;
-uniform sampler2D texture0;
-out vec4 result;
-void main() { result = vec4(light * texture(texture0, place).rgb, 1.0); })";
-
-constexpr const char* kGroundFragment = R"(#version 330 core
-in vec3 light;
-in vec2 place;
-in vec2 light_place;
-uniform sampler2D texture0;
-uniform sampler2D texture1;
-out vec4 result;
-void main() {
-  result = vec4(2.0 * light * texture(texture0, place).rgb * texture(texture1, light_place).rgb, 1.0);
-})";
-
-constexpr const char* kSkyVertex = R"(#version 330 core
-layout(location = 0) in vec3 position;
-layout(location = 2) in vec2 uv;
-uniform mat4 view;
-uniform mat4 model;
-out vec2 place;
-void main() {
-  place = uv;
-  gl_Position = view * model * vec4(position, 1.0);
-})";
-
-constexpr const char* kSkyFragment = R"(#version 330 core
-in vec2 place;
-uniform sampler2D texture0;
-out vec4 result;
-void main() { result = texture(texture0, place); })";
-
-constexpr const char* kShadowVertex = R"(#version 330 core
-layout(location = 0) in vec3 position;
-uniform mat4 view;
-uniform mat4 model;
-uniform vec3 sun_direction;
-void main() {
-  vec4 world = model * vec4(position, 1.0);
-  // Along the sun's rays onto z = 0.
-  world.xyz -= sun_direction * (max(world.z, 0.0) / sun_direction.z);
-  gl_Position = view * world;
-})";
-
-constexpr const char* kShadowFragment = R"(#version 330 core
-out vec4 result;
-void main() { result = vec4(0.0, 0.0, 0.0, 0.45); })";
 
 std::array<float, 16> ToMatrix(const btTransform& pose) {
   btScalar m[16];
@@ -119,6 +53,10 @@ bool IsGround(const Geometry& geometry) {
   return geometry.type == Geometry::Type::kPlane || geometry.type == Geometry::Type::kTerrain;
 }
 
+std::string Source(const char* text, bool shadow_map) {
+  return std::string(shadow_map ? shaders::kWithShadowMap : shaders::kVersion) + text;
+}
+
 btTransform Place(const btTransform& pose, int frame, const std::vector<btTransform>& frames) {
   return frame < 0 ? pose : frames[size_t(frame)] * pose;
 }
@@ -126,18 +64,21 @@ btTransform Place(const btTransform& pose, int frame, const std::vector<btTransf
 }  // namespace
 
 Renderer::Renderer(const StereoCamera& camera, const World& world, const Scene& scene,
-                   const Resources& resources, const WarningSink& warn)
+                   bool shadow_map, const Resources& resources, const WarningSink& warn)
     : camera_(camera),
       sun_direction_(world.sun_direction),
       resources_(resources),
       warn_(warn),
-      lit_(kLitVertex, kLitFragment),
-      ground_(kLitVertex, kGroundFragment),
-      sky_(kSkyVertex, kSkyFragment),
-      shadow_(kShadowVertex, kShadowFragment),
+      lit_(Source(shaders::kLitVertex, shadow_map),
+           Source(shaders::kFragmentLight, shadow_map) + shaders::kLitFragment),
+      ground_(Source(shaders::kLitVertex, shadow_map),
+              Source(shaders::kFragmentLight, shadow_map) + shaders::kGroundFragment),
+      sky_(Source(shaders::kSkyVertex, false), Source(shaders::kSkyFragment, false)),
+      shadow_(Source(shaders::kShadowVertex, false), Source(shaders::kShadowFragment, false)),
+      depth_(Source(shaders::kDepthVertex, false), Source(shaders::kDepthFragment, false)),
       framebuffer_(2 * camera.width, camera.height),
-      sky_colour_{0.62f, 0.72f, 0.85f},
-      stencil_(size_t(camera.width) * size_t(camera.height)) {
+      sky_colour_{0.62f, 0.72f, 0.85f} {
+  if (shadow_map) sun_map_.emplace(world.sun_direction);
   const std::array<float, 3> sun{float(sun_direction_.x()), float(sun_direction_.y()),
                                  float(sun_direction_.z())};
   for (const GlProgram* program : {&lit_, &ground_, &sky_, &shadow_}) {
@@ -147,6 +88,7 @@ Renderer::Renderer(const StereoCamera& camera, const World& world, const Scene& 
     program->Set("ambient", world.ambient);
     program->Set("texture0", 0);
     program->Set("texture1", 1);
+    program->Set("sun_map", kSunMapUnit);
   }
   for (const SceneNode& node : scene.visuals) {
     const Material& material = node.visual.material;
@@ -158,7 +100,7 @@ Renderer::Renderer(const StereoCamera& camera, const World& world, const Scene& 
     item.colour = material.colour;
     item.pose = node.visual.pose;
     item.frame = node.frame;
-    item.target = node.target;
+    item.label = std::min(node.label, kLastLabel);
     items_.push_back(item);
   }
   for (const ShadowNode& node : scene.shadows) {
@@ -242,6 +184,8 @@ int Renderer::triangles() const {
 void Renderer::Render(const btTransform& mount, const std::vector<btTransform>& frames,
                       StereoImages* images, TargetMask* mask) {
   context_.MakeCurrent();
+  Arrange(frames);
+  if (sun_map_) DrawSunMap(mount);
   framebuffer_.Bind();
   glEnable(GL_DEPTH_TEST);
   glEnable(GL_CULL_FACE);
@@ -252,8 +196,8 @@ void Renderer::Render(const btTransform& mount, const std::vector<btTransform>& 
   glClearColor(sky_colour_[0], sky_colour_[1], sky_colour_[2], 1);
   glClearStencil(0);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT | GL_STENCIL_BUFFER_BIT);
-  DrawEye(Eye::kLeft, mount, frames);
-  DrawEye(Eye::kRight, mount, frames);
+  DrawEye(Eye::kLeft, mount);
+  DrawEye(Eye::kRight, mount);
 
   const size_t bytes = size_t(camera_.width) * size_t(camera_.height) * 3;
   images->left.resize(bytes);
@@ -265,7 +209,37 @@ void Renderer::Render(const btTransform& mount, const std::vector<btTransform>& 
   if (mask != nullptr) ReadMask(mask);
 }
 
-void Renderer::DrawEye(Eye eye, const btTransform& mount, const std::vector<btTransform>& frames) {
+void Renderer::Arrange(const std::vector<btTransform>& frames) {
+  item_poses_.clear();
+  for (const Item& item : items_) item_poses_.push_back(Place(item.pose, item.frame, frames));
+  shadow_poses_.clear();
+  for (const Shadow& shadow : shadows_) {
+    shadow_poses_.push_back(Place(shadow.pose, shadow.frame, frames));
+  }
+}
+
+void Renderer::DrawSunMap(const btTransform& mount) {
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LEQUAL);
+  sun_map_->Begin(mount.getOrigin() + btScalar(kAhead) * mount.getBasis().getColumn(0));
+  depth_.Use();
+  depth_.Set("view", sun_map_->view());
+  for (size_t i = 0; i < items_.size(); ++i) {
+    const btTransform& pose = item_poses_[i];
+    depth_.Set("model", ToMatrix(pose));
+    meshes_[items_[i].mesh].Draw([&](const btVector3& centre, btScalar radius) {
+      return sun_map_->Sees(pose * centre, radius);
+    });
+  }
+  sun_map_->End();
+  for (const GlProgram* program : {&lit_, &ground_}) {
+    program->Use();
+    program->Set("sun_view", sun_map_->view());
+  }
+  sun_map_->Bind(kSunMapUnit);
+}
+
+void Renderer::DrawEye(Eye eye, const btTransform& mount) {
   glViewport(eye == Eye::kLeft ? 0 : camera_.width, 0, camera_.width, camera_.height);
   const btTransform optical = mount * camera_.Optical(eye);
   const std::array<float, 16> view = Multiply(camera_.Projection(), ToMatrix(optical.inverse()));
@@ -273,34 +247,41 @@ void Renderer::DrawEye(Eye eye, const btTransform& mount, const std::vector<btTr
     program->Use();
     program->Set("view", view);
   }
-  // The ground first, since shadows are blended onto it before anything stands in front of it.
-  glStencilFunc(GL_ALWAYS, 0, 0xff);
-  glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
-  ground_.Use();
-  DrawItems(ground_, true, frames);
-  DrawShadows(frames);
+  // What stands on the ground first: it hides much of the ground, which is dear to shade. The sky
+  // last, for the same reason.
   glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
   lit_.Use();
-  DrawItems(lit_, false, frames);
+  DrawItems(lit_, false, optical);
+  ground_.Use();
+  DrawItems(ground_, true, optical);
+  if (!sun_map_) DrawShadows(optical);
+  glStencilFunc(GL_ALWAYS, kSkyLabel, 0xff);
   if (sky_texture_ != 0) DrawSky(optical);
 }
 
-void Renderer::DrawItems(const GlProgram& program, bool ground,
-                         const std::vector<btTransform>& frames) {
-  for (const Item& item : items_) {
+void Renderer::DrawItems(const GlProgram& program, bool ground, const btTransform& optical) {
+  for (size_t i = 0; i < items_.size(); ++i) {
+    const Item& item = items_[i];
     if (item.ground != ground) continue;
-    program.Set("model", ToMatrix(Place(item.pose, item.frame, frames)));
+    const btTransform in_view = optical.inverseTimes(item_poses_[i]);
+    const auto sees = [&](const btVector3& centre, btScalar radius) {
+      return camera_.Sees(in_view * centre, radius);
+    };
+    if (!meshes_[item.mesh].AnyPiece(sees)) continue;
+    program.Set("model", ToMatrix(item_poses_[i]));
     program.Set("colour", item.colour);
-    glStencilFunc(GL_ALWAYS, item.target ? kTargetBit : 0, 0xff);
-    glActiveTexture(GL_TEXTURE1);
-    glBindTexture(GL_TEXTURE_2D, item.light_map);
+    glStencilFunc(GL_ALWAYS, item.label | (ground ? kGroundBit : 0), 0xff);
+    if (ground) {
+      glActiveTexture(GL_TEXTURE1);
+      glBindTexture(GL_TEXTURE_2D, item.light_map);
+    }
     glActiveTexture(GL_TEXTURE0);
     glBindTexture(GL_TEXTURE_2D, item.texture);
-    meshes_[item.mesh].Draw();
+    meshes_[item.mesh].Draw(sees);
   }
 }
 
-void Renderer::DrawShadows(const std::vector<btTransform>& frames) {
+void Renderer::DrawShadows(const btTransform& optical) {
   if (sun_direction_.z() > -0.1) return;  // A sun this low has no shadow that ends.
   shadow_.Use();
   glEnable(GL_BLEND);
@@ -309,13 +290,24 @@ void Renderer::DrawShadows(const std::vector<btTransform>& frames) {
   glDepthMask(GL_FALSE);
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(-1.f, -4.f);
-  // Each pixel is darkened once, however many shadows fall on it.
-  glStencilFunc(GL_NOTEQUAL, kShadowBit, kShadowBit);
-  glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
-  for (const Shadow& shadow : shadows_) {
-    shadow_.Set("model", ToMatrix(Place(shadow.pose, shadow.frame, frames)));
-    meshes_[shadow.mesh].Draw();
+  // Only the ground is darkened, each pixel once, however many shadows fall on it.
+  glStencilFunc(GL_EQUAL, kGroundBit, kGroundBit | kShadowBit);
+  glStencilMask(kShadowBit);
+  glStencilOp(GL_KEEP, GL_KEEP, GL_INVERT);
+  const btTransform to_view = optical.inverse();
+  // A sphere's shadow lies within a sphere about its centre's shadow.
+  const btScalar stretch = 1 + 1 / btFabs(sun_direction_.z());
+  for (size_t i = 0; i < shadows_.size(); ++i) {
+    const btTransform& pose = shadow_poses_[i];
+    shadow_.Set("model", ToMatrix(pose));
+    meshes_[shadows_[i].mesh].Draw([&](const btVector3& centre, btScalar radius) {
+      btVector3 place = pose * centre;
+      place -= sun_direction_ * (btMax(place.z(), btScalar(0)) / sun_direction_.z());
+      return camera_.Sees(to_view * place, stretch * radius);
+    });
   }
+  glStencilMask(0xff);
+  glStencilOp(GL_KEEP, GL_KEEP, GL_REPLACE);
   glDisable(GL_POLYGON_OFFSET_FILL);
   glDepthMask(GL_TRUE);
   glEnable(GL_CULL_FACE);
@@ -323,23 +315,44 @@ void Renderer::DrawShadows(const std::vector<btTransform>& frames) {
 }
 
 void Renderer::DrawSky(const btTransform& optical) {
-  // Last, so that only what is really sky is shaded. It moves with the camera.
+  // It moves with the camera.
   sky_.Use();
   sky_.Set("model", ToMatrix(btTransform(btQuaternion::getIdentity(), optical.getOrigin())));
-  glStencilFunc(GL_ALWAYS, 0, 0xff);
+  glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D, sky_texture_);
-  meshes_[sky_mesh_].Draw();
+  meshes_[sky_mesh_].Draw([](const btVector3&, btScalar) { return true; });
+}
+
+void Renderer::ReadLabels(std::vector<uint8_t>* labels) {
+  labels->resize(size_t(camera_.width) * size_t(camera_.height));
+  context_.MakeCurrent();
+  framebuffer_.Bind();
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, camera_.width, camera_.height, GL_STENCIL_INDEX, GL_UNSIGNED_BYTE,
+               labels->data());
+  for (uint8_t& label : *labels) label &= kLabelBits;
+}
+
+void Renderer::ReadDepth(std::vector<float>* depth) {
+  ReadLabels(&labels_);
+  depth->resize(labels_.size());
+  glReadPixels(0, 0, camera_.width, camera_.height, GL_DEPTH_COMPONENT, GL_FLOAT, depth->data());
+  const double near = camera_.near, far = camera_.far;
+  for (size_t i = 0; i < depth->size(); ++i) {
+    float& value = (*depth)[i];
+    value = labels_[i] == kSkyLabel ? std::numeric_limits<float>::infinity()
+                                    : float(near * far / (far - double(value) * (far - near)));
+  }
 }
 
 void Renderer::ReadMask(TargetMask* mask) {
-  glReadPixels(0, 0, camera_.width, camera_.height, GL_STENCIL_INDEX, GL_UNSIGNED_BYTE,
-               stencil_.data());
+  ReadLabels(&labels_);
   int left = camera_.width, right = -1, top = camera_.height, bottom = -1;
   *mask = TargetMask();
   for (int y = 0; y < camera_.height; ++y) {
-    const uint8_t* row = &stencil_[size_t(y) * size_t(camera_.width)];
+    const uint8_t* row = &labels_[size_t(y) * size_t(camera_.width)];
     for (int x = 0; x < camera_.width; ++x) {
-      if (row[x] != kTargetBit) continue;
+      if (row[x] != kTargetLabel) continue;
       ++mask->pixels;
       left = std::min(left, x);
       right = std::max(right, x);

@@ -43,6 +43,8 @@ struct Simulation::State {
         target(simulation.cast_.MakeTarget(&physics)),
         sensors(simulation.config_.sensors, simulation.config_.seed, vehicle->body(),
                 simulation.world_.gravity),
+        exposure(simulation.config_.effects.exposure_change,
+                 simulation.config_.effects.exposure_time, simulation.config_.seed),
         last_touch(size_t(physics.objects().size()) + 1, std::numeric_limits<int64_t>::min() / 2) {}
 
   // It is nothing that the vehicle could run into.
@@ -53,6 +55,7 @@ struct Simulation::State {
   Physics physics;
   std::unique_ptr<MobileRobot> vehicle, target;
   Sensors sensors;
+  Exposure exposure;
   std::vector<int64_t> last_touch;  // Step of the last contact with each owner.
   uint32_t collisions = 0;
 };
@@ -68,8 +71,13 @@ Simulation::Simulation(const SimulationConfig& config, const WarningSink& warn)
   if (!(config_.frame_rate >= 1 && config_.frame_rate <= 250)) {
     throw std::invalid_argument("the frame rate must be 1 to 250 Hz");
   }
+  const CameraEffects& effects = config_.effects;
+  if (!(effects.blur_pictures >= 1 && effects.blur_pictures <= 64)) {
+    throw std::invalid_argument("blur_pictures must be 1 to 64");
+  }
   Reset();
-  renderer_ = std::make_unique<Renderer>(camera_, world_, MakeScene(), resources_, warn);
+  renderer_ = std::make_unique<Renderer>(camera_, world_, MakeScene(), config_.effects.shadow_map,
+                                         resources_, warn);
 }
 
 Simulation::~Simulation() = default;
@@ -85,12 +93,13 @@ Scene Simulation::MakeScene() const {
   Scene scene;
   int frame = 0;
   for (const MobileRobot* robot : {state_->vehicle.get(), state_->target.get()}) {
+    const int label = robot == state_->target.get() ? kTargetLabel : kVehicleLabel;
     for (const RobotPart& part : robot->parts()) {
       const btTransform to_part = part.links.front()->pose.inverse();
       for (const RobotLink* link : part.links) {
         for (Visual visual : link->visuals) {
           visual.pose = to_part * visual.pose;
-          scene.visuals.push_back({std::move(visual), frame, robot == state_->target.get()});
+          scene.visuals.push_back({std::move(visual), frame, label});
         }
         for (Collision shape : link->collisions) {
           shape.pose = to_part * shape.pose;
@@ -100,10 +109,12 @@ Scene Simulation::MakeScene() const {
       ++frame;
     }
   }
+  int label = kFirstModelLabel;
   for (const Model& model : world_.models) {
     const int own = model.script.empty() ? -1 : frame++;
-    for (const Visual& visual : model.visuals) scene.visuals.push_back({visual, own, false});
+    for (const Visual& visual : model.visuals) scene.visuals.push_back({visual, own, label});
     for (const Collision& shape : model.collisions) scene.shadows.push_back({shape, own});
+    ++label;
   }
   return scene;
 }
@@ -126,7 +137,10 @@ Moment Simulation::Advance() {
     moment.slow_tick = step_ % (2 * kStepsPerTick) == 0;
     moment.frame = step_ == FrameStep(frame_ + 1);
     if (moment.tick) state_->sensors.Sample(double(kStepsPerTick) / kStepsPerSecond);
-    if (moment.frame) ++frame_;
+    if (moment.frame) {
+      ++frame_;
+      state_->exposure.Advance(1 / config_.frame_rate);
+    }
   }
   return moment;
 }
@@ -146,15 +160,30 @@ void Simulation::CountContacts() {
   }
 }
 
-void Simulation::Render(StereoImages* images, TargetMask* mask) {
+// The picture as it was some seconds before this moment.
+void Simulation::Draw(double before, StereoImages* images, TargetMask* mask) {
   std::vector<btTransform> frames;
   for (const MobileRobot* robot : {state_->vehicle.get(), state_->target.get()}) {
-    for (const RobotPart& part : robot->parts()) frames.push_back(part.body.Pose());
+    for (const RobotPart& part : robot->parts()) frames.push_back(part.body.PoseBefore(before));
   }
   for (const Model& model : world_.models) {
-    if (!model.script.empty()) frames.push_back(model.PoseAt(time()));
+    if (!model.script.empty()) frames.push_back(model.PoseAt(time() - before));
   }
   renderer_->Render(frames.front() * camera_.Mount(), frames, images, mask);
+}
+
+void Simulation::Render(StereoImages* images, TargetMask* mask) {
+  const int pictures = config_.effects.blur_pictures;
+  for (int i = pictures - 1; i > 0; --i) {
+    Draw(i * config_.effects.shutter_time / (pictures - 1), images, nullptr);
+    blur_.Add(*images);
+  }
+  Draw(0, images, mask);
+  if (pictures > 1) {
+    blur_.Add(*images);
+    blur_.Take(images);
+  }
+  state_->exposure.Apply(images);
   image_noise_.Add(frame_, Eye::kLeft, &images->left);
   image_noise_.Add(frame_, Eye::kRight, &images->right);
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sim/cast.h"
+#include "sim/exposure.h"
 #include "sim/image_noise.h"
 #include "sim/physics.h"
 #include "sim/renderer.h"
@@ -15,6 +16,15 @@
 
 namespace tld_follower::sim {
 
+/// What a camera does to its pictures beyond noise; config/simulator.yaml.
+struct CameraEffects {
+  bool shadow_map = false;      ///< Shadows fall on everything, not on the ground alone.
+  double exposure_change = 0;   ///< Standard deviation of a wandering gain [stops].
+  double exposure_time = 2.0;   ///< Its correlation time [s].
+  int blur_pictures = 1;        ///< Pictures that one is averaged of; 1 for no motion blur.
+  double shutter_time = 0.008;  ///< In which they are taken, the last one at the stamp [s].
+};
+
 struct SimulationConfig {
   std::string world_file;
   uint64_t seed = 0;
@@ -22,6 +32,7 @@ struct SimulationConfig {
   double image_noise = 1.0;  ///< Standard deviation [grey levels].
   StereoCamera camera;       ///< A ground vehicle carries it on its mast instead.
   CastConfig cast;
+  CameraEffects effects;
   SensorParameters sensors;
 };
 
@@ -69,6 +80,9 @@ class Simulation {
 
   /// Draws the stereo pair of this moment; also finds the target's pixels unless `mask` is null.
   void Render(StereoImages* images, TargetMask* mask);
+  /// Of the left picture that was drawn last: depth [m] and labels (renderer.h).
+  void ReadDepth(std::vector<float>* depth) { renderer_->ReadDepth(depth); }
+  void ReadLabels(std::vector<uint8_t>* labels) { renderer_->ReadLabels(labels); }
   /// Computes the truth of this moment.
   Truth Measure() const;
 
@@ -88,6 +102,7 @@ class Simulation {
   struct State;
 
   Scene MakeScene() const;
+  void Draw(double before, StereoImages* images, TargetMask* mask);
   int64_t FrameStep(uint64_t frame) const;
   void CountContacts();
 
@@ -97,6 +112,7 @@ class Simulation {
   const Cast cast_;
   const StereoCamera camera_;
   ImageNoise image_noise_;
+  Blur blur_;
   std::unique_ptr<State> state_;
   std::unique_ptr<Renderer> renderer_;
   int64_t step_ = 0;

@@ -61,7 +61,7 @@ TEST(Camera, KnownPointsLandOnTheirPixelsInBothEyes) {
        {btVector3(0, 0, btScalar(1.5)), btVector3(btScalar(-0.6), btScalar(-0.4), btScalar(1.6)),
         btVector3(btScalar(0.7), btScalar(0.5), btScalar(1.7))}) {
     const btVector3 centre = mount * camera.Optical(Eye::kLeft) * point;
-    Renderer renderer(camera, BrightWorld(), {{Ball(centre, radius)}, {}}, Resources({}),
+    Renderer renderer(camera, BrightWorld(), {{Ball(centre, radius)}, {}}, false, Resources({}),
                       ThrowWarning);
     StereoImages images;
     renderer.Render(mount, {}, &images, nullptr);
@@ -81,7 +81,7 @@ TEST(Camera, ShiftBetweenTheEyesIsFocalLengthTimesBaselineOverDepth) {
   StereoCamera camera;
   camera.pitch = 0;
   camera.position.setValue(0, 0, 0);
-  Renderer renderer(camera, BrightWorld(), {{Ball({2, 0, 0}, 0.05)}, {}}, Resources({}),
+  Renderer renderer(camera, BrightWorld(), {{Ball({2, 0, 0}, 0.05)}, {}}, false, Resources({}),
                     ThrowWarning);
   StereoImages images;
   renderer.Render(btTransform::getIdentity(), {}, &images, nullptr);
@@ -96,10 +96,10 @@ TEST(Camera, TargetMaskCountsWhatIsSeenAlone) {
   camera.pitch = 0;
   camera.position.setValue(0, 0, 0);
   Scene scene{{Ball({2, 0, 0}, 0.3)}, {}};
-  scene.visuals[0].target = true;
+  scene.visuals[0].label = kTargetLabel;
   StereoImages images;
   TargetMask free, half;
-  Renderer(camera, BrightWorld(), scene, Resources({}), ThrowWarning)
+  Renderer(camera, BrightWorld(), scene, false, Resources({}), ThrowWarning)
       .Render(btTransform::getIdentity(), {}, &images, &free);
   EXPECT_NEAR(free.width, 2 * 502.3 * 0.3 / 2, 4);
   EXPECT_NEAR(free.x + (free.width - 1) / 2.0, camera.Cx() + 502.3 * 0.0245 / 2, 1);
@@ -108,13 +108,13 @@ TEST(Camera, TargetMaskCountsWhatIsSeenAlone) {
   screen.visual.geometry.size.setValue(btScalar(0.1), 1, 2);
   screen.visual.pose.setOrigin({1, btScalar(0.5 + 0.0245 / 2), 0});
   scene.visuals.push_back(screen);
-  Renderer(camera, BrightWorld(), scene, Resources({}), ThrowWarning)
+  Renderer(camera, BrightWorld(), scene, false, Resources({}), ThrowWarning)
       .Render(btTransform::getIdentity(), {}, &images, &half);
   EXPECT_NEAR(half.pixels, free.pixels / 2, free.pixels / 20);
   EXPECT_EQ(half.y, free.y);
 
   scene.visuals[1].visual.geometry.size.setValue(btScalar(0.1), 4, 4);
-  Renderer(camera, BrightWorld(), scene, Resources({}), ThrowWarning)
+  Renderer(camera, BrightWorld(), scene, false, Resources({}), ThrowWarning)
       .Render(btTransform::getIdentity(), {}, &images, &half);
   EXPECT_EQ(half.pixels, 0);
   EXPECT_EQ(half.width, 0);
@@ -128,7 +128,7 @@ TEST(Camera, MissingTextureIsOneWarningAndAMagentaPattern) {
     node.visual.material.texture = "media/no_such.png";
   }
   StereoCamera camera;
-  Renderer renderer(camera, BrightWorld(), scene, Resources({}), warnings.Sink());
+  Renderer renderer(camera, BrightWorld(), scene, false, Resources({}), warnings.Sink());
   StereoImages images;
   renderer.Render(camera.Mount(), {}, &images, nullptr);
   ASSERT_EQ(warnings.lines.size(), 1u);
@@ -147,15 +147,15 @@ TEST(Camera, MissingAndBrokenMeshesAreWarningsAndBoxes) {
   for (SceneNode& node : scene.visuals) {
     node.visual.geometry.type = Geometry::Type::kMesh;
     node.visual.geometry.mesh = "media/no_such.obj";
-    node.target = true;
+    node.label = kTargetLabel;
   }
   scene.visuals[2].visual.geometry.mesh = broken.path();
-  scene.visuals[2].target = false;
+  scene.visuals[2].label = kSkyLabel;
   StereoCamera camera;
   camera.pitch = 0;
   camera.position.setValue(0, 0, 0);
   const Resources resources({std::filesystem::temp_directory_path().string()});
-  Renderer renderer(camera, BrightWorld(), scene, resources, warnings.Sink());
+  Renderer renderer(camera, BrightWorld(), scene, false, resources, warnings.Sink());
   StereoImages images;
   TargetMask mask;
   renderer.Render(btTransform::getIdentity(), {}, &images, &mask);

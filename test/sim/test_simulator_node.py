@@ -167,6 +167,31 @@ class SimulatorNodeTest(unittest.TestCase):
         self.assertEqual(pace["skipped frames"], "0")
         self.assertGreater(float(pace["real-time factor"]), 0)
 
+    def test_depth_and_labels_come_only_while_subscribed(self):
+        self.step(3)
+        got = {}
+        subscribers = [
+            rospy.Subscriber(f"/gazebo/{kind}", Image, lambda m, kind=kind: got.update({kind: m}))
+            for kind in ("depth", "labels")
+        ]
+        wait_for(lambda: all(s.get_num_connections() for s in subscribers), "connected")
+        response = self.step(120)
+        wait_for(
+            lambda: len(got) == 2 and all(m.header.stamp == response.stamp for m in got.values()), "both"
+        )
+        for subscriber in subscribers:
+            subscriber.unregister()
+        self.assertEqual((got["depth"].encoding, got["labels"].encoding), ("32FC1", "mono8"))
+        depth = np.frombuffer(got["depth"].data, np.float32).reshape(240, 320)
+        labels = np.frombuffer(got["labels"].data, np.uint8).reshape(240, 320)
+        truth = self.got["/gazebo/truth"][-1]
+        self.assertEqual(np.count_nonzero(labels == 1), truth.target_pixels)
+        # The nearest point of the target is on the way down: less deep than far.
+        self.assertLess(depth[labels == 1].min(), truth.distance)
+        self.assertGreater(depth[labels == 1].min(), 0.8 * truth.distance)
+        self.assertTrue(np.isinf(depth[labels == 0]).all())
+        self.assertTrue(np.isfinite(depth[labels != 0]).all())
+
     def test_wind_blows_and_is_refused_if_not_finite(self):
         self.step(150)
         wind = rospy.Publisher("/wind", Vector3, queue_size=10, latch=True)
