@@ -248,9 +248,17 @@ class SimulatorNodeTest(unittest.TestCase):
 
     def test_lockstep_goes_on_when_no_command_comes(self):
         type(self).answer = None
+        log = []
+        listener = rospy.Subscriber("/rosout", Log, log.append)
+        wait_for(lambda: listener.get_num_connections() >= 2, "log connected")
         start = time.monotonic()
         self.step(3)
         self.assertGreater(time.monotonic() - start, 1.9, "it did not wait for commands")
+        wait_for(lambda: any("lockstep" in m.msg for m in log), "the warning")
+        warning = next(m.msg for m in log if "lockstep" in m.msg)
+        self.assertIn("no /cmd_vel answered", warning)
+        self.assertIn("who publishes it is silent", warning)
+        listener.unregister()
 
     def test_commands_that_are_not_finite_make_it_hover(self):
         self.step(150)
