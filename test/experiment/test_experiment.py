@@ -74,7 +74,7 @@ def test_plots_and_video_are_written(results):
 
 def test_with_depth_the_target_is_followed_past_what_passes_before_it(tmp_path):
     path = tmp_path / "occlusion.json"
-    done = run("occlusion", "--use-depth", "--first-seed", 2, "--resolution", "320x240", "--json", path)
+    done = run("occlusion", "--first-seed", 2, "--resolution", "320x240", "--json", path)
     assert done.returncode == 0, done.stderr
     result = json.loads(path.read_text())
     assert (result["use_depth"], result["world"]) == (True, "empty.world")

@@ -58,7 +58,10 @@ def parse_arguments(argv):
     )
     parser.add_argument("--tracker", choices=("tld", "tld_sift"), default="tld")
     parser.add_argument(
-        "--use-depth", action="store_true", help="the tracker takes the cloud as well (default: images alone)"
+        "--use-depth",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="the tracker takes the cloud as well, or images alone",
     )
     parser.add_argument(
         "--use-right-camera",
