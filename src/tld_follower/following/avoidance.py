@@ -10,6 +10,8 @@ from tld_follower.following.mapping import to_velocity
 
 # Every second row and column: an obstacle at the minimum distance covers thousands of pixels.
 _STRIDE = 2
+# A trend is of so many images without a gap [s] or a jump [m]: of one thing.
+_IMAGES, _GAP, _JUMP = 4, 0.15, 0.15
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,26 @@ class Nearest:
     distance: float = math.nan
     below: float = math.nan
     point: np.ndarray | None = None
+
+
+class Trend:
+    """How near the nearest thing will be: its distance over the last images, carried on."""
+
+    def __init__(self, ahead):
+        self._ahead = ahead
+        self._seen = []  # (s, m)
+
+    def ahead(self, stamp, distance):
+        """Return the distance to expect, metres, given this image's; never more than that."""
+        last = self._seen[-1] if self._seen else None
+        if last is None or not 0 < stamp - last[0] < _GAP or not abs(distance - last[1]) < _JUMP:
+            self._seen = []
+        self._seen = [*self._seen[1 - _IMAGES :], (stamp, distance)]
+        if len(self._seen) < _IMAGES:
+            return distance
+        times, distances = np.array(self._seen).T
+        rate = float(np.polyfit(times - stamp, distances, 1)[0])
+        return distance + min(0.0, rate) * self._ahead
 
 
 class Avoidance:

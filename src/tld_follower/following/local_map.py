@@ -10,6 +10,7 @@ _CELLS = np.array([80, 80, 28])  # 4 m about the drone, 1.4 m above and below
 _STRIDE = 4  # pixels between the points that are entered
 _NEVER = -1e9
 _SIGHTINGS = 2
+_BEFORE = 0.15  # m, nearer than the target's near surface by this: not the target
 _MEMORY = 0.4  # s for each cloud in which a cell was seen occupied
 
 
@@ -60,7 +61,8 @@ class LocalMap:
         motion : Motion
             The drone's own, at the cloud's time.
         target : tuple of ndarray (3,) and float, or None
-            The target's middle in the odom frame and its radius, metres: what is there is not entered.
+            The middle of the target's near surface in the odom frame, and its radius, metres: what is within
+            it and not before that surface is not entered.
         """
         if not self._start:
             self._start = motion.stamp
@@ -74,7 +76,8 @@ class LocalMap:
         _clear(self._sightings, self._known, cloud, sight, to_optical, camera.focal_length, self._p.map_range)
         reach = (camera.focal_length, self._p.map_range, now)
         place = to_optical @ (middle - centre)
-        _enter(self._occupied, self._sightings, cloud, turn, centre - corner, reach, place, radius)
+        before = float(np.linalg.norm(place)) - _BEFORE
+        _enter(self._occupied, self._sightings, cloud, turn, centre - corner, reach, place, (radius, before))
 
     def pass_through(self, motion):
         """Note that nothing else is where the vehicle itself is."""
@@ -138,9 +141,21 @@ def _clear(sightings, known, cloud, corner, to_optical, focal, far):
 
 
 @njit(cache=True)
-def _enter(occupied, sightings, cloud, turn, centre, reach, target, radius):
+def _seen_beside(sightings, i, j, k):
+    """Return 1 if a cell beside this one was seen occupied: what moves is in another cell in each cloud."""
+    for a in range(max(i - 1, 0), min(i + 2, sightings.shape[0])):
+        for b in range(max(j - 1, 0), min(j + 2, sightings.shape[1])):
+            if sightings[a, b, k]:
+                return 1
+    return 0
+
+
+@njit(cache=True)
+def _enter(occupied, sightings, cloud, turn, centre, reach, target, extent):
     """Mark cells that hold a quarter of the points that a filled one would, and three at least."""
     focal, far, now = reach
+    radius, before = extent
+    before_this = sightings.copy()
     counts = np.zeros(occupied.shape, np.int32)
     depths = np.zeros(occupied.shape, np.float32)
     for v in range(0, cloud.shape[0], _STRIDE):
@@ -148,7 +163,8 @@ def _enter(occupied, sightings, cloud, turn, centre, reach, target, radius):
             x, y, z = cloud[v, u, 0], cloud[v, u, 1], cloud[v, u, 2]
             if not (math.isfinite(x) and math.isfinite(y) and 0 < z < far):
                 continue
-            if (x - target[0]) ** 2 + (y - target[1]) ** 2 + (z - target[2]) ** 2 < radius * radius:
+            off = (x - target[0]) ** 2 + (y - target[1]) ** 2 + (z - target[2]) ** 2
+            if off < radius * radius and x * x + y * y + z * z > before * before:
                 continue
             i = math.floor((centre[0] + turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z) / CELL)
             j = math.floor((centre[1] + turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z) / CELL)
@@ -163,7 +179,8 @@ def _enter(occupied, sightings, cloud, turn, centre, reach, target, radius):
                     edge = CELL * focal / depths[i, j, k] / _STRIDE
                     if counts[i, j, k] >= 0.25 * edge * edge:
                         occupied[i, j, k] = now
-                        sightings[i, j, k] = min(sightings[i, j, k] + 1, 120)
+                        near = _seen_beside(before_this, i, j, k)
+                        sightings[i, j, k] = min(max(sightings[i, j, k], near) + 1, 120)
 
 
 def warm_up():
@@ -173,4 +190,4 @@ def warm_up():
     sightings, known = np.zeros(grid.shape, np.int8), np.zeros(grid.shape, np.bool_)
     turn, place = np.eye(3), np.zeros(3)
     _clear(sightings, known, cloud, place, turn, 1.0, 1.0)
-    _enter(grid, sightings, cloud, turn, place, (1.0, 1.0, np.float32(0)), place, 0.0)
+    _enter(grid, sightings, cloud, turn, place, (1.0, 1.0, np.float32(0)), place, (0.0, 0.0))

@@ -10,7 +10,7 @@ LATERALS = ("yaw", "strafe", "both")
 
 
 _ANY_SIGN = ("camera_pitch", "camera_x", "camera_y", "camera_z")
-_MAY_BE_ZERO = ("search_time", "lost_hover", "coast_time", "near_margin", "anticipation")
+_MAY_BE_ZERO = ("search_time", "lost_hover", "coast_time", "near_margin", "near_ahead", "anticipation")
 
 
 def _allowed(name, value):
@@ -56,7 +56,7 @@ class Parameters:
     gate_frames: int = 15
     target_acceleration: float = 1.5
     manoeuvre_acceleration: float = 8.0
-    target_radius: float = 1.3
+    target_radius: float = 2.0
     target_climb: float = 2.0
     velocity_lag: float = 0.294
     tilt_lag: float = 0.1
@@ -72,11 +72,12 @@ class Parameters:
     body_radius: float = 0.25
     body_height: float = 0.1
     clearance: float = 0.35
-    clearance_below: float = 0.25
+    clearance_below: float = 0.4
     near_margin: float = 0.1
+    near_ahead: float = 0.3
     braking: float = 2.5
     reaction_time: float = 0.25
-    leave_gain: float = 2.0
+    leave_gain: float = 5.0
     unknown_speed: float = 0.5
     threat_time: float = 1.0
     map_range: float = 4.0

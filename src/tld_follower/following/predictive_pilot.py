@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tld_follower.following.avoidance import Avoidance
+from tld_follower.following.avoidance import Avoidance, Trend
 from tld_follower.following.camera import Camera
 from tld_follower.following.controller import Command
 from tld_follower.following.distance import make_distance
@@ -29,6 +29,7 @@ class PredictivePilot:
         self._camera = Camera.of(parameters)
         self._controller = PredictiveController(parameters)
         self._nearest = Avoidance(parameters).nearest
+        self._trend = Trend(parameters.near_ahead)
         self._safe = SafeMotion(parameters)
         self._map = LocalMap(parameters)
         self._mapped = -math.inf
@@ -126,7 +127,7 @@ class PredictivePilot:
         return self._map.obstacles(scene.now)
 
     def _body(self, scene):
-        """Return the ball that holds the target, which is no obstacle: middle and radius; or None."""
+        """Return the place of the target's near surface, and the radius of what belongs to it."""
         if scene.box is None or not self._filter.started:
             return None
         surface = self._filter.at(scene.cloud_stamp)[0]
@@ -134,26 +135,31 @@ class PredictivePilot:
         distance = float(np.linalg.norm(sight))
         radius = self._p.target_radius * math.hypot(scene.box.width, scene.box.height) / 2
         radius *= distance / self._camera.focal_length
-        return surface + sight / distance * radius * 0.5, radius
+        return surface, radius
 
     def _fly(self, velocity, yaw_rate, scene, nearest, obstacles, threatened):
         """Make a wanted velocity (odom frame) safe; return the command and what hinders it."""
         present = scene.present
         reason = ""
         if scene.cloud is not None:
-            self._near = (
-                self._near + 1 if nearest.distance < self._p.minimum_distance + self._p.near_margin else 0
-            )
+            soon = self._trend.ahead(scene.cloud_stamp, nearest.distance)
+            near = soon < self._p.minimum_distance + self._p.near_margin
+            self._near = self._near + 1 if near else 0
             if self._near >= _NEAR_FRAMES:
-                place = self._camera.centre(scene.cloud_then) + scene.cloud_then.attitude @ (
-                    self._camera.to_body @ nearest.point
-                )
-                obstacles = np.vstack([obstacles, place])
+                obstacles = np.vstack([obstacles, self._place(nearest, soon, scene)])
             heading = level(present.yaw)[:, 0]
             way = self._safe.choose(velocity, present.position, heading, self._map, obstacles, threatened)
             velocity, reason = way.velocity, way.reason
         x, y, z = level(present.yaw).T @ velocity
         return Command(float(x), float(y), float(z), float(yaw_rate)), reason
+
+    def _place(self, nearest, soon, scene):
+        """Return the place of the nearest thing, odom frame; inside the free zone if it must be left."""
+        then = scene.cloud_then
+        place = self._camera.centre(then) + then.attitude @ (self._camera.to_body @ nearest.point)
+        if soon >= self._p.minimum_distance:
+            return place
+        return scene.present.position + self._safe.into_zone(place - scene.present.position)
 
     def _target_velocity(self, scene):
         if not self._filter.started or scene.now - self._seen > self._p.max_age:

@@ -7,6 +7,7 @@ import numpy as np
 
 _STEP = 0.1  # m, between the places of a path that are looked up
 _HEADROOM = 1.0  # m, above a ground vehicle's base: higher things are no obstacle to it
+_INSIDE = 0.9  # of the free zone's radius
 _CHANGED = 0.1  # m/s, a smaller change of the wanted velocity is none
 _DETOUR = 0.5  # of the wanted speed: below this a way around is looked for
 _DIRECTIONS = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)], dtype=float)
@@ -148,6 +149,11 @@ class SafeMotion:
     def _stopping_speed(self, free):
         a, t = self._p.braking, self._p.reaction_time
         return a * (np.sqrt(t * t + 2 * np.minimum(free, 1e3) / a) - t)
+
+    def into_zone(self, offset):
+        """Return an offset from the vehicle, shortened so far that it lies well inside the free zone."""
+        length = float(np.linalg.norm(offset * self._scale))
+        return offset * min(1.0, _INSIDE * self._keep / max(length, 1e-6))
 
     def reaches(self, position, spot, obstacles):
         """Whether the straight way between two places is free of obstacles."""

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tld_follower.box import Box
+from tld_follower.following.avoidance import Trend
 from tld_follower.following.controller import HOVER
 from tld_follower.following.follower import Follower, Mode
 from tld_follower.following.search import Phase
@@ -276,3 +277,14 @@ def test_every_command_is_finite_and_within_the_caps(data):
         if abs(age) > parameters.max_age and parameters.distance == "stereo":
             assert command == HOVER
         last = command
+
+
+def test_a_trend_tells_what_comes_on_from_what_jumps():
+    trend = Trend(0.3)
+    coming = [trend.ahead(n / RATE, 1.0 - 0.02 * n) for n in range(6)]
+    assert coming[2] == pytest.approx(0.96)  # too few to tell
+    assert coming[5] == pytest.approx(0.9 - 0.3 * 0.02 * RATE)
+    assert trend.ahead(6 / RATE, 0.4) == 0.4  # another thing
+    assert [trend.ahead((7 + n) / RATE, 0.4 + 0.05 * n) for n in range(6)][-1] == pytest.approx(
+        0.65
+    )  # leaves
