@@ -7,21 +7,23 @@ from numba import njit
 
 CELL = 0.1  # m
 _CELLS = np.array([80, 80, 28])  # 4 m about the drone, 1.4 m above and below
-_STRIDE = 4  # pixels between the points that are entered
+_ACROSS = 160  # points of a row that are entered
 _NEVER = -1e9
 _SIGHTINGS = 2
 _BEFORE = 0.15  # m, nearer than the target's near surface by this: not the target
-_MEMORY = 0.4  # s for each cloud in which a cell was seen occupied
+# Things have moved if columns of so many cells were left that were seen so lately [s]; then what was seen
+# in so long [s] is forgotten within so many cells of them.
+_UPRIGHT, _LATELY, _PASSED, _ABOUT = 3, 1.0, 3.0, 8
 
 
 class LocalMap:
     """A grid of cells about the drone in the odom frame, moved along by whole cells.
 
     A cell is an obstacle where enough points of a cloud fall into it, in two clouds at least since the camera
-    last looked through it to something farther off: wrong matches are seldom in one place twice. The oftener
-    it was seen, the longer it is remembered out of view: what passed by is not there any more. A cell is
-    known once the camera has looked there and saw nothing nearer: also where no depth is measured, as in the
-    sky.
+    last looked through it to something farther off: wrong matches are seldom in one place twice. It is
+    remembered for `map_memory` seconds; but where things are seen to have moved away, what was seen beside
+    them just before is forgotten out of view, too: it has moved with them. A cell is known once the camera
+    has looked there and saw nothing nearer: also where no depth is measured, as in the sky.
     """
 
     def __init__(self, parameters):
@@ -73,11 +75,24 @@ class LocalMap:
         middle, radius = target or (corner, 0.0)
         to_optical = np.ascontiguousarray(turn.T)
         sight = to_optical @ (corner - centre)
+        earlier = self._sightings.copy()
         _clear(self._sightings, self._known, cloud, sight, to_optical, camera.focal_length, self._p.map_range)
         reach = (camera.focal_length, self._p.map_range, now)
         place = to_optical @ (middle - centre)
         before = float(np.linalg.norm(place)) - _BEFORE
         _enter(self._occupied, self._sightings, cloud, turn, centre - corner, reach, place, (radius, before))
+        self._forget_moved(earlier, now)
+
+    def _forget_moved(self, earlier, now):
+        """Forget what was lately seen about places that upright things have just left."""
+        left = (earlier >= _SIGHTINGS) & (self._sightings == 0) & (self._occupied > now - _LATELY)
+        columns = np.argwhere(left.sum(axis=2) >= _UPRIGHT)
+        if len(columns) < 2:
+            return
+        low, high = np.maximum(columns.min(axis=0) - _ABOUT, 0), columns.max(axis=0) + _ABOUT + 1
+        about = (slice(low[0], high[0]), slice(low[1], high[1]))
+        seen = self._occupied[about]
+        self._sightings[about][(seen > now - _PASSED) & (seen < now)] = 0
 
     def pass_through(self, motion):
         """Note that nothing else is where the vehicle itself is."""
@@ -88,13 +103,12 @@ class LocalMap:
         self._sightings[at] = 0
         self._known[at] = True
 
-    def obstacles(self, now):
-        """Centres of the occupied cells, ndarray (n, 3), metres, odom frame."""
+    def obstacles(self, now, longest):
+        """Return the middles of the cells that are obstacles, (n, 3) metres, odom frame; `longest` in s."""
         if self._origin is None:
             return np.empty((0, 3))
         age = now - self._start - self._occupied
-        memory = np.minimum(self._sightings * np.float32(_MEMORY), np.float32(self._p.map_memory))
-        found = np.argwhere((self._sightings >= _SIGHTINGS) & (age < memory))
+        found = np.argwhere((self._sightings >= _SIGHTINGS) & (age < longest))
         return (found + self._origin + 0.5) * CELL
 
     def known(self, points):
@@ -158,8 +172,9 @@ def _enter(occupied, sightings, cloud, turn, centre, reach, target, extent):
     before_this = sightings.copy()
     counts = np.zeros(occupied.shape, np.int32)
     depths = np.zeros(occupied.shape, np.float32)
-    for v in range(0, cloud.shape[0], _STRIDE):
-        for u in range(0, cloud.shape[1], _STRIDE):
+    stride = max(1, cloud.shape[1] // _ACROSS)
+    for v in range(0, cloud.shape[0], stride):
+        for u in range(0, cloud.shape[1], stride):
             x, y, z = cloud[v, u, 0], cloud[v, u, 1], cloud[v, u, 2]
             if not (math.isfinite(x) and math.isfinite(y) and 0 < z < far):
                 continue
@@ -176,7 +191,7 @@ def _enter(occupied, sightings, cloud, turn, centre, reach, target, extent):
         for j in range(counts.shape[1]):
             for k in range(counts.shape[2]):
                 if counts[i, j, k] >= 3:
-                    edge = CELL * focal / depths[i, j, k] / _STRIDE
+                    edge = CELL * focal / depths[i, j, k] / stride
                     if counts[i, j, k] >= 0.25 * edge * edge:
                         occupied[i, j, k] = now
                         near = _seen_beside(before_this, i, j, k)

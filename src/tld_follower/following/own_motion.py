@@ -73,6 +73,11 @@ class OwnMotion:
         self._bias = np.zeros(3)
         self._heard = -math.inf
 
+    @property
+    def measured(self):
+        """Whether there is odometry; else positions are reckoned, and good for a short time only."""
+        return bool(self._history) and self._history[-1].stamp - self._heard <= _SILENT
+
     def add(self, stamp, position, quaternion, velocity):
         """Take a measurement.
 

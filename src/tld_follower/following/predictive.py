@@ -7,6 +7,7 @@ import numpy as np
 from tld_follower.following.controller import Command
 from tld_follower.following.own_motion import level
 
+_RECKONED_POLE = 2.0  # 1/s
 _FACING = math.radians(60)  # a target farther to the side than this is turned to before it is flown to
 
 
@@ -26,7 +27,7 @@ class PredictiveController:
     def __init__(self, parameters):
         self._p = parameters
 
-    def command(self, position, velocity, motion, camera):
+    def command(self, position, velocity, motion, camera, measured):
         """Compute the command of this moment.
 
         Parameters
@@ -36,6 +37,8 @@ class PredictiveController:
         motion : Motion
             The drone's own.
         camera : Camera
+        measured : bool
+            Whether the drone's motion is; where it is reckoned, the law is slow: the tilt is not known.
 
         Returns
         -------
@@ -45,7 +48,7 @@ class PredictiveController:
         sight = to_yaw_frame @ (position - camera.centre(motion))
         target, own = to_yaw_frame @ velocity, to_yaw_frame @ motion.velocity
         bearing = math.atan2(sight[1], sight[0])
-        along = self._along(sight, target, own, to_yaw_frame @ motion.acceleration)
+        along = self._along(sight, target, own, to_yaw_frame @ motion.acceleration, measured)
         if abs(bearing) > _FACING:
             along = np.minimum(along, 0.0)
         horizontal = self._lateral(along, sight, target, bearing)
@@ -56,14 +59,15 @@ class PredictiveController:
             yaw=self._turn(sight, target - own, bearing),
         )
 
-    def _along(self, sight, target, own, acceleration):
+    def _along(self, sight, target, own, acceleration, measured):
         """Horizontal velocity along the line of sight, yaw frame, shape (2,)."""
         p = self._p
         distance = float(np.linalg.norm(sight))
         direction = sight[:2] / max(float(np.hypot(*sight[:2])), 1e-6)
         error = distance - p.set_distance
         opening = float((target - own)[:2] @ direction)
-        pole = p.near_pole if error + p.anticipation * opening < 0 else p.far_pole
+        near = error + p.anticipation * opening < 0
+        pole = _RECKONED_POLE if not measured else p.near_pole if near else p.far_pole
         wanted = (
             p.tilt_lag * pole**3 * error
             + 3 * p.tilt_lag * pole**2 * opening

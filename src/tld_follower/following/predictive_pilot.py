@@ -17,6 +17,7 @@ from tld_follower.following.state import Mode, State
 from tld_follower.following.target_filter import TargetFilter
 
 _MAP_INTERVAL = 0.06  # s between clouds that are entered into the map
+_RECKONED_MEMORY = 0.5  # s, of obstacles in a frame that drifts
 _NEAR_FRAMES = 2  # a lone wrong match is not in two images
 
 
@@ -81,7 +82,9 @@ class PredictivePilot:
         if not self._filter.started or scene.now - self._ranged > p.max_age:
             return Mode.FOLLOWING, "no depth inside the box", distance, np.zeros(3), yaw_only.yaw, False
         position, velocity = self._filter.at(scene.now)
-        command = self._controller.command(position, velocity, scene.present, self._camera)
+        command = self._controller.command(
+            position, velocity, scene.present, self._camera, self._own.measured
+        )
         wanted = level(scene.present.yaw) @ [command.x, command.y, command.z]
         sight = position - self._camera.centre(scene.present)
         away = float(np.linalg.norm(sight))
@@ -117,14 +120,15 @@ class PredictivePilot:
 
     def _remember(self, scene):
         """Enter the cloud into the map; return what is to be kept away from, ndarray (n, 3), odom frame."""
+        memory = self._p.map_memory if self._own.measured else _RECKONED_MEMORY
         self._map.move(scene.present.position)
         self._map.pass_through(scene.present)
         if scene.cloud is None:
-            return self._map.obstacles(scene.now)
+            return self._map.obstacles(scene.now, memory)
         if scene.cloud_stamp - self._mapped > _MAP_INTERVAL or scene.cloud_stamp < self._mapped:
             self._mapped = scene.cloud_stamp
             self._map.add(scene.cloud, self._camera, scene.cloud_then, self._body(scene))
-        return self._map.obstacles(scene.now)
+        return self._map.obstacles(scene.now, memory)
 
     def _body(self, scene):
         """Return the place of the target's near surface, and the radius of what belongs to it."""

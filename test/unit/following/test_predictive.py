@@ -87,7 +87,7 @@ def test_without_odometry_it_reckons_from_its_commands():
     world = World(target=(2.2, 0.0, 0.2))
     world.tell = lambda: None
     fly(world, 5.0)
-    assert world.distance() == pytest.approx(1.0, abs=0.12)
+    assert world.distance() == pytest.approx(1.0, abs=0.2)
 
 
 def test_it_does_not_fly_into_a_post_in_its_way():
@@ -112,7 +112,7 @@ def test_what_left_the_view_is_remembered_when_backing_off():
     world.yaw = 0.9
     world.target = np.array([3.0, 3.6, 0.2])
     world.tell()
-    fly(world, 0.5)
+    fly(world, 1.0)  # a target that jumps is believed after half a second
     direction = (world.position - world.target) * [1.0, 1.0, 0.0]
     world.target_velocity = 0.7 * direction / np.linalg.norm(direction)
     clearances = []
