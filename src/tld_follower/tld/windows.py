@@ -51,7 +51,9 @@ def window_sizes(box: Box, comparisons: np.ndarray, parameters: Parameters) -> l
 
     They differ by `scale_step`, `scales` of them to either side; those with a side under `min_side` are left
     out. Each is scanned on the octave where its side (root of the area) is `window_side` to twice that, so
-    that the blur is in proportion and large windows cost no more than small ones.
+    that the blur is in proportion and large windows cost no more than small ones. Sideways they step by the
+    whole number of pixels nearest to the shift: with more windows than it asks for, detections are too dense,
+    which makes for more false ones.
     """
     sizes = []
     for exponent in range(-parameters.scales, parameters.scales + 1):
@@ -62,7 +64,7 @@ def window_sizes(box: Box, comparisons: np.ndarray, parameters: Parameters) -> l
         octave = max(0, int(np.floor(np.log2(np.sqrt(width * height) / parameters.window_side))))
         factor = 1 << octave
         level_w, level_h = max(width / factor, 2.0), max(height / factor, 2.0)
-        steps = float(max(int(parameters.shift * level_w), 1)), max(parameters.shift * level_h, 1.0)
+        steps = float(max(round(parameters.shift * level_w), 1)), max(parameters.shift * level_h, 1.0)
         grid = (level_w, level_h, *steps)
         offsets = pixel_offsets(comparisons, round(level_w), round(level_h))
         sizes.append(WindowSize(width, height, octave, factor, grid, offsets))

@@ -37,18 +37,20 @@ def detector(scene):
     return trained(scene)
 
 
-@pytest.mark.parametrize("place", [Box(100.3, 20.6, 36.0, 30.0), Box(60, 40, 36, 30).scale(1.2**2)], ids=str)
-def test_finds_the_target_elsewhere_and_larger(scene, place):
+@pytest.mark.parametrize(
+    ("place", "least"), [(Box(100.3, 20.6, 36.0, 30.0), 0.7), (Box(60, 40, 36, 30).scale(1.2**2), 0.55)]
+)
+def test_finds_the_target_elsewhere_and_larger(scene, place, least):
     frame = Frame(scene.frame(place), 3.0)
     overlap = []
-    for seed in range(4):
+    for seed in range(8):
         detector = trained(scene, seed=seed)
         clusters = detector.clusters(detector.detect(frame, TARGET, 4))
         assert len(clusters) == 1
-        assert detector.accepts(clusters[0].confidence)
+        assert clusters[0].confidence > detector.nn_threshold
         overlap.append(clusters[0].box.overlap(place))
-    assert min(overlap) > 0.5
-    assert np.mean(overlap) > 0.7
+    assert min(overlap) > least
+    assert np.mean(overlap) > 0.75
 
 
 def test_finds_nothing_where_there_is_none(scene, detector):

@@ -47,7 +47,7 @@ def test_large_windows_are_scanned_on_an_octave_of_bounded_size(side):
         on_level = size.width / size.factor
         assert on_level < 48.0
         assert size.octave == 0 or on_level >= 24.0
-        assert size.grid[2] == max(int(0.1 * on_level), 1)
+        assert size.grid[2] == max(round(0.1 * on_level), 1)
         assert size.grid[3] == pytest.approx(max(0.1 * on_level, 1.0))
 
 
