@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from tld_follower.box import Box
+from tld_follower.tld.outline import Found, Outline
 from tld_follower.tld.parameters import Parameters
 
 # Share of a box's sides, about its centre, that is taken for the target rather than for what surrounds it.
@@ -24,6 +25,13 @@ MIN_PIXELS = 20
 # it a running median.
 FIRST_SIZES = 10
 STEP = 0.01
+# Half the depth that the target may fill, in sides of it: for a camera whose image is as wide as far, which
+# is about so for most.
+RADIUS = 2.0
+# Least overlap of the outline with a trusted box, and for how many such frames in succession until the
+# outline alone says where the target is.
+HOLD_OVERLAP = 0.5
+HOLD_FRAMES = 3
 
 
 class TargetDepth:
@@ -43,6 +51,9 @@ class TargetDepth:
         self._distance: float | None = None
         self._relief: float | None = None
         self._age = 0
+        self._outline = Outline(parameters.depth_error)
+        self._box: Box | None = None
+        self._held = 0
 
     @property
     def size(self) -> float | None:
@@ -81,6 +92,8 @@ class TargetDepth:
             raise ValueError(f"the depth map is {shape} of {depth.dtype}, the image {width}x{height}")
         self._before, self._depth = self._depth, depth
         self._age += 1
+        far = self._fill(self._box, width)[1] if self._distance else np.inf
+        self._outline.look(depth, self._box, far)
 
     def leave_view(self) -> None:
         """Forget the last depth map: the next image is another camera's."""
@@ -90,18 +103,37 @@ class TargetDepth:
         """Whether a box may be the target: False if hardly any of its middle lies where the target must be.
 
         The target must be at the distance that fits the box's size and its own, and where it was last seen or
-        as far from there as it may have moved since.
+        as far from there as it may have moved since. One with an outline must stand out from the ground.
         """
-        depths = self._sample(box.scale(CENTER))
-        if depths is None:
-            return True
-        low, high = self._limits(box)
-        return bool(np.mean((depths >= low) & (depths <= high)) >= self._parameters.depth_support)
+        fitting = self._fitting(box)
+        return fitting is None or bool(fitting[1].mean() >= self._parameters.depth_support)
 
     def occluded(self, box: Box) -> bool:
         """Whether something stands before the target: many pixels of the box are nearer than its front."""
-        depths = self._sample(box)
-        return depths is not None and bool(np.mean(depths < self._nearest) > self._parameters.depth_front)
+        sample = self._sample(box)
+        return sample is not None and bool(np.mean(sample[0] < self._nearest) > self._parameters.depth_front)
+
+    def hold(self, box: Box) -> Box | None:
+        """Find the target by its place alone, where that was sure in the frames before.
+
+        Parameters
+        ----------
+        box : about where it is [pixel].
+
+        Returns
+        -------
+        The box of its outline; None where there is none that goes on from the frame before: at the depth and
+        of the size that the target can have, with nothing before it.
+        """
+        if self._held < HOLD_FRAMES:
+            return None
+        found = self._fit(box)
+        if found is None or found.box.overlap(box) < HOLD_OVERLAP:
+            self._held = 0
+            return None
+        self._distance = found.depth
+        self._age = 0
+        return found.box
 
     def uncovered(self, points: np.ndarray) -> np.ndarray:
         """Return the points (N, 2) [pixel] that nothing stood before in the frame before this one."""
@@ -121,19 +153,58 @@ class TargetDepth:
         box : the target [pixel].
         trusted : the box is sure enough to learn the target's size from it, and the target not occluded.
         """
-        whole, middle = self._sample(box), self._sample(box.scale(CENTER))
-        if whole is None or middle is None:
+        self._box = box
+        if not trusted:
+            self._held = 0
+        whole, fitting = self._sample(box), self._fitting(box)
+        if whole is None or fitting is None or not fitting[1].any():
+            self._held = 0
             return
-        low, high = self._limits(box)
-        middle = middle[(middle >= low) & (middle <= high)]
-        if not middle.size:
-            return
-        self._distance = float(np.median(middle))
-        self._age = 0
+        if self._age:  # the outline did not tell
+            self._distance = float(np.median(fitting[0][fitting[1]]))
+            self._age = 0
         if trusted:
-            relief = float(np.quantile(whole, FRONT)) / self._distance
+            relief = float(np.quantile(whole[0], FRONT)) / self._distance
             self._relief = relief if self._relief is None else _stepped(self._relief, relief)
             self._learn_size(np.sqrt(box.area) * self._distance)
+            self._follow_outline(box)
+
+    def _follow_outline(self, box: Box) -> None:
+        """Learn how the outline lies in a trusted box; then count the frames in which they agree."""
+        if not self._outline.known:
+            self._outline.learn(self._depth, box, self._fill(box, self._depth.shape[1]), self._distance)
+        elif self._held < HOLD_FRAMES:
+            found = self._fit(box)
+            self._held = self._held + 1 if found and found.box.overlap(box) > HOLD_OVERLAP else 0
+
+    def _fit(self, box: Box) -> Found | None:
+        """Return the target's outline about a box."""
+        if self._depth is None or not self._outline.known or self._size is None or self._distance is None:
+            return None
+        found = self._outline.find(self._depth, box, self._fill(box, self._depth.shape[1]))
+        if found is None:
+            return None
+        change = np.sqrt(found.box.area) * found.depth / self._size
+        if not 1.0 / self._parameters.depth_size <= change <= self._parameters.depth_size:
+            return None
+        return None if self.occluded(found.box) else found
+
+    def _fill(self, box: Box, width: int) -> tuple[float, float]:
+        """Least and greatest depth [m] of any part of the target in a box in an image of a width."""
+        size = self._size or np.sqrt(box.area) * self._distance
+        radius = RADIUS * size / width + self._moved
+        near = max(self._nearest, self._nearer(self._distance - radius))
+        return near, self._farther(self._distance + radius)
+
+    def _fitting(self, box: Box) -> tuple[np.ndarray, np.ndarray] | None:
+        """Known depths (N,) [m] in the middle of a box, and which of them may be the target's."""
+        sample = self._sample(box.scale(CENTER))
+        if sample is None:
+            return None
+        depths, outstanding = sample
+        low, high = self._limits(box)
+        fitting = (depths >= low) & (depths <= high)
+        return depths, fitting & outstanding if self._outline.known else fitting
 
     def _learn_size(self, size: float) -> None:
         if self._size is None:
@@ -143,8 +214,11 @@ class TargetDepth:
         else:
             self._size = _stepped(self._size, size)
 
-    def _sample(self, box: Box) -> np.ndarray | None:
-        """Known depths (N,) [m] on a grid over a box; None where too few pixels have one."""
+    def _sample(self, box: Box) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the known depths (N,) [m] on a grid over a box, and which stand out from the ground.
+
+        None where too few pixels have one.
+        """
         if self._depth is None:
             return None
         inside = box.clip(self._depth.shape[1], self._depth.shape[0])
@@ -153,8 +227,10 @@ class TargetDepth:
             for start, end in ((inside.x, inside.right), (inside.y, inside.bottom))
         )
         depths = self._depth[rows, columns]
-        known = depths[(depths > 0.0) & (depths < np.inf)]
-        return known if known.size >= max(MIN_PIXELS, self._parameters.depth_valid * depths.size) else None
+        known = (depths > 0.0) & (depths < np.inf)
+        if np.count_nonzero(known) < max(MIN_PIXELS, self._parameters.depth_valid * depths.size):
+            return None
+        return depths[known], self._outline.outstanding(depths, columns, rows)[known]
 
     def _limits(self, box: Box) -> tuple[float, float]:
         """Least and greatest depth [m] that the target may have if it is in a box."""

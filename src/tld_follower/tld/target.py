@@ -9,7 +9,7 @@ import numpy as np
 
 from tld_follower.box import Box
 from tld_follower.tld import keypoints
-from tld_follower.tld.alignment import align
+from tld_follower.tld.alignment import align, blend
 from tld_follower.tld.depth import TargetDepth
 from tld_follower.tld.detector import Cluster, Detections, Detector
 from tld_follower.tld.frame import Frame
@@ -25,6 +25,8 @@ from tld_follower.tld.trust import Trust
 MAX_ASKED = 3
 # First step of the search that fits a detected box to the target [share of its sides].
 DETECTED_STEP = 0.1
+# How far the tracked box goes towards the target's outline in a frame; all the way where they overlap less.
+OUTLINE_SHARE, OUTLINE_OVERLAP = 0.3, 0.6
 
 
 @dataclass(frozen=True)
@@ -169,8 +171,14 @@ class Target:
             self._parameters.tracking_scales + self._trust.missed // self._parameters.widen_frames,
             self._parameters.scales,
         )
+        outline = self._depth.hold(flow.box if flow else self._box) if self._box else None
         detections = self._detector.detect(frame, self._last_box, reach)
-        result = self._redetect(frame, detections) if flow is None else self._fuse(frame, flow, detections)
+        if outline:
+            result = self._hold(frame, flow, outline)
+        elif flow:
+            result = self._fuse(frame, flow, detections)
+        else:
+            result = self._redetect(frame, detections)
         if result.box is None:
             self._trust.missed += 1
         else:
@@ -214,6 +222,13 @@ class Target:
         if flow is None or flow.box.inside_fraction(frame.width, frame.height) <= 0.0:
             return None
         return flow
+
+    def _hold(self, frame: Frame, flow: Flow | None, outline: Box) -> Result:
+        """Go on with the target that depth shows to be in its place, whatever it looks like."""
+        near = flow is not None and flow.box.overlap(outline) > OUTLINE_OVERLAP
+        self._box = blend(flow.box, outline, OUTLINE_SHARE) if near else outline
+        self._trust.vouch()
+        return Result(self._box, self._similarity(frame, self._box)[0], True, self._trust.valid, "tracker")
 
     def _fuse(self, frame: Frame, flow: Flow, detections: Detections) -> Result:
         """Decide on the state of the object while there is a tracked box (thesis section 3.1.4)."""

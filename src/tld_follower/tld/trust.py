@@ -56,6 +56,13 @@ class Trust:
         """Ask for more than steady points from here on: they may be the background's."""
         self._doubtful = True
 
+    def vouch(self) -> None:
+        """Take in a frame in which depth shows the target in its place: what it looks like is no matter."""
+        self._doubtful = self._provisional = False
+        self._weak = 0
+        self._steady += 1
+        self._shown += 1
+
     def drop(self) -> None:
         """End the trajectory."""
         self.valid = False
