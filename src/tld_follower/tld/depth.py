@@ -187,7 +187,7 @@ class TargetDepth:
         change = np.sqrt(found.box.area) * found.depth / self._size
         if not 1.0 / self._parameters.depth_size <= change <= self._parameters.depth_size:
             return None
-        return None if self.occluded(found.box) else found
+        return None if self.occluded(found.box) or self.occluded(box) else found
 
     def _fill(self, box: Box, width: int) -> tuple[float, float]:
         """Least and greatest depth [m] of any part of the target in a box in an image of a width."""

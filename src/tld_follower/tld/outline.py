@@ -31,6 +31,10 @@ GRID = 96
 MIDDLE = 0.6
 # Fewest points of a thing.
 LEAST = 20
+# Which way is inwards from a left, top, right and bottom side.
+INWARDS = np.array([1, 1, -1, -1])
+# Most of the image's columns and rows at a border in which a stereo matcher knows nothing.
+BLIND = (0.25, 0.06)
 # About a box, what is left out of the plane [sides of the box].
 AROUND = 1.1
 # The first trusted boxes say how the outline lies in them, if in so many of them it overlaps them by so much.
@@ -144,6 +148,7 @@ class Outline:
     def __init__(self, tolerance: float) -> None:
         self._tolerance = tolerance
         self._plane = Plane(tolerance)
+        self._area = np.zeros(4)
         self._tries = 0
         self._samples: list[np.ndarray] = []
         self._margins: np.ndarray | None = None
@@ -166,6 +171,7 @@ class Outline:
             self._plane = Plane(self._tolerance)
         else:
             self._plane.fit(depth, target and target.scale(AROUND), far)
+            self._area = _known_area(depth)
 
     def outstanding(self, depth: np.ndarray, columns: slice, rows: slice) -> np.ndarray:
         """Which points of a part of the image stand out from the plane, bool (rows, columns).
@@ -245,19 +251,37 @@ class Outline:
         x, y, across, down, _ = (int(value) for value in stats[best])
         ends = np.array([x, y, x + across, y + down])
         whole = np.array([0, 0, part.shape[1], part.shape[0]])
-        known = (part > 0.0) & (part < np.inf)
-        across_known, down_known = np.flatnonzero(known.any(axis=0)), np.flatnonzero(known.any(axis=1))
-        limit = np.array([across_known[0], down_known[0], across_known[-1] + 1, down_known[-1] + 1])
-        border = [columns.start <= 0, rows.start <= 0, columns.stop >= width, rows.stop >= height]
-        open_sides = (np.abs(ends - limit) <= 1) & ((limit != whole) | border)
+        sides = np.array([columns.start, rows.start] * 2) + ends * step
+        open_sides = (sides - self._area) * INWARDS < 2 * step
         if np.count_nonzero((ends == whole) & ~open_sides) > 1:
             return None
-        left, top, right, bottom = map(float, ends * step + np.array([columns.start, rows.start] * 2))
+        left, top, right, bottom = map(float, sides)
         return Found(
             Box(left, top, min(right, width) - left, min(bottom, height) - top),
             float(np.median(part[(labels == best) & things])),
             open_sides,
         )
+
+
+def _known_area(depth: np.ndarray) -> np.ndarray:
+    """Left, top, right and bottom of the part of an image (H, W) in which depth can be known [pixel].
+
+    A stereo matcher knows none in a strip at the left, as wide as its greatest disparity, and at the borders.
+    A broader strip is no such one, but has nothing to match: the sky.
+    """
+    grid = (depth > 0.0) & (depth < np.inf)
+    ends = [
+        _known_span(grid[:: 1 + len(grid) // PLANE_GRID[1]].any(axis=0), BLIND[0]),
+        _known_span(grid[:, :: 1 + grid.shape[1] // PLANE_GRID[0]].any(axis=1), BLIND[1]),
+    ]
+    return np.array(ends).T.ravel()
+
+
+def _known_span(known: np.ndarray, blind: float) -> tuple[int, int]:
+    """First and last end of what is known of a line, bool (N,); its own where more than a share is not."""
+    number = len(known)
+    first, last = int(np.argmax(known)), number - int(np.argmax(known[::-1]))
+    return first if first <= blind * number else 0, last if number - last <= blind * number else number
 
 
 def _sides(box: Box) -> np.ndarray:

@@ -26,7 +26,7 @@ MAX_ASKED = 3
 # First step of the search that fits a detected box to the target [share of its sides].
 DETECTED_STEP = 0.1
 # How far the tracked box goes towards the target's outline in a frame; all the way where they overlap less.
-OUTLINE_SHARE, OUTLINE_OVERLAP = 0.3, 0.6
+OUTLINE_SHARE, OUTLINE_OVERLAP = 0.3, 0.8
 
 
 @dataclass(frozen=True)
@@ -184,8 +184,8 @@ class Target:
         else:
             self._trust.missed = 0
             self._last_box = result.box
-            trusted = learning and self._trust.learnable and not self._depth.occluded(result.box)
-            if trusted:
+            trusted = self._trust.learnable and not self._depth.occluded(result.box)
+            if trusted and learning:
                 self._learn(frame, result.box, detections)
             self._depth.follow(result.box, trusted)
         self._frame = frame
