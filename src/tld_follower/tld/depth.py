@@ -28,6 +28,8 @@ STEP = 0.01
 # Half the depth that the target may fill, in sides of it: for a camera whose image is as wide as far, which
 # is about so for most.
 RADIUS = 2.0
+# How much farther than that the ground is looked at.
+BEYOND = 1.5
 # Least overlap of the outline with a trusted box, and for how many such frames in succession until the
 # outline alone says where the target is.
 HOLD_OVERLAP = 0.5
@@ -92,7 +94,7 @@ class TargetDepth:
             raise ValueError(f"the depth map is {shape} of {depth.dtype}, the image {width}x{height}")
         self._before, self._depth = self._depth, depth
         self._age += 1
-        far = self._fill(self._box, width)[1] if self._distance else np.inf
+        far = BEYOND * self._fill(self._box, width)[1] if self._distance else np.inf
         self._outline.look(depth, self._box, far)
 
     def leave_view(self) -> None:

@@ -16,7 +16,7 @@ from tld_follower.box import Box
 
 # The image's grid on which the plane is sought: columns, rows; and how many known points it wants.
 PLANE_GRID = (40, 30)
-PLANE_POINTS = 60
+PLANE_POINTS = 20
 # Triples of points tried for it each frame, beside the plane of the frame before; least squares after that.
 TRIPLES = 40
 # Least area of a triple [half of the image].
@@ -165,7 +165,7 @@ class Outline:
         ----------
         depth : float (H, W) [m], see `Plane.fit`; None if there is none.
         target : where the target was [pixel]; None before it was seen.
-        far : greatest depth that a part of it may have [m].
+        far : greatest depth of the ground about it that matters [m].
         """
         if depth is None or (self._tries >= FIRST and not self.known):
             self._plane = Plane(self._tolerance)
