@@ -85,10 +85,10 @@ class Parameters:
     # search
     lost_hover: float = 0.3
     search_time: float = 30.0
-    search_speed: float = 1.0
+    search_speed: float = 1.2
     search_climb: float = 0.5
     sweep_rate: float = 0.9
-    coast_time: float = 3.0
+    coast_time: float = 4.0
     go_limit: float = 8.0
 
     def __post_init__(self):

@@ -43,6 +43,7 @@ class PredictivePilot:
         self._filter = TargetFilter(self._p)
         self._ranged = -math.inf  # when the distance was measured last
         self._seen = -math.inf
+        self._sight = np.array([self._p.set_distance, 0.0, 0.0])  # from the camera, when it was seen last
         self._search = None
         self._gave_up = False
 
@@ -75,6 +76,7 @@ class PredictivePilot:
         expected = math.nan
         if self._filter.started:
             expected = float(np.linalg.norm(self._filter.at(scene.stamp)[0] - centre))
+            self._sight = self._filter.at(scene.stamp)[0] - centre
         distance = self._distance.measure(box, scene.cloud, expected)
         if self._filter.update(scene.stamp, centre, ray, distance):
             self._ranged = scene.stamp
@@ -115,8 +117,8 @@ class PredictivePilot:
 
     def _begin_search(self, scene):
         position, velocity = self._filter.at(self._seen)
-        sight = level(scene.present.yaw).T @ (position + velocity - self._camera.centre(scene.present))
-        return Search(self._p, self._seen, position, velocity, math.atan2(sight[1], sight[0]))
+        heading = level(scene.present.yaw).T @ (position + velocity - self._camera.centre(scene.present))
+        return Search(self._p, self._seen, position, velocity, self._sight, heading[1])
 
     def _remember(self, scene):
         """Enter the cloud into the map; return what is to be kept away from, ndarray (n, 3), odom frame."""

@@ -12,7 +12,8 @@ _FACED = 0.15  # rad
 _LOOK = 1.0  # s, to where the target should be, before it is looked for elsewhere
 _REPLAN = 0.5  # s
 _ANGLES = np.linspace(0, 2 * math.pi, 24, endpoint=False)
-_RADII = (1.2, 2.0)  # m, from where the target should be
+_RADII = (1.2, 2.0)  # set distances, from where the target should be
+_NEARNESS = 0.5  # m of difference to the view that was last for each m on the way
 _RISES = (0.0, 0.5)  # m
 _THERE = 0.2  # m
 _HIDING = 0.3  # m, farther than this from the sight line a cell hides nothing
@@ -46,15 +47,18 @@ class Search:
         When the target was lost, s.
     position, velocity : ndarray, shape (3,)
         Of the target then, m and m/s in the odom frame.
-    bearing : float
-        The side to which it was heading, rad, left positive: the sense of turning.
+    sight : ndarray, shape (3,)
+        From the camera to the target when it was seen last, odom frame.
+    side : float
+        The side to which it was heading, left positive: the sense of turning.
     """
 
-    def __init__(self, parameters, now, position, velocity, bearing):
+    def __init__(self, parameters, now, position, velocity, sight, side):
         self._p = parameters
         self._lost_at = now
         self._position, self._velocity = position, velocity * np.array([1.0, 1.0, 0.0])
-        self._side = 1.0 if bearing >= 0 else -1.0
+        self._sight = sight * (parameters.set_distance / max(float(np.linalg.norm(sight)), 1e-3))
+        self._side = 1.0 if side >= 0 else -1.0
         self._plan = [Phase.GO, Phase.SWEEP, Phase.CLIMB, Phase.SWEEP]
         self._start(now)
 
@@ -127,18 +131,21 @@ class Search:
         return math.atan2(sight[1], sight[0])
 
     def _viewpoint(self, place, position, obstacles, safe):
-        """Return the nearest place in reach from which the target's place can be seen; None without one."""
-        spots = np.array(
-            [
-                [place[0] + r * math.cos(a), place[1] + r * math.sin(a), position[2] + rise]
-                for r in _RADII
-                for a in _ANGLES
-                for rise in _RISES
-            ]
-        )
-        ways = spots - position
-        lengths = np.linalg.norm(ways, axis=1)
-        for spot in spots[np.argsort(lengths)]:
+        """Return the best spot in reach from which the target's place can be seen; None without one.
+
+        Best is where it looks as it did when it was seen last, a little less so what is near: a tracker finds
+        again what it has learnt.
+        """
+        ideal = place - self._sight
+        around = [
+            [place[0] + r * math.cos(a), place[1] + r * math.sin(a), ideal[2] + rise]
+            for r in np.array(_RADII) * self._p.set_distance
+            for a in _ANGLES
+            for rise in _RISES
+        ]
+        spots = np.array([ideal, *around])
+        cost = np.linalg.norm(spots - ideal, axis=1) + _NEARNESS * np.linalg.norm(spots - position, axis=1)
+        for spot in spots[np.argsort(cost)]:
             if safe.reaches(position, spot, obstacles) and _sees(spot, place, obstacles):
                 return spot
         return None
