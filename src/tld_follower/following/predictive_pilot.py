@@ -1,6 +1,7 @@
 """The predictive follower: keeps track of target and obstacles in the odom frame, seen or not."""
 
 import math
+from collections import deque
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from tld_follower.following.target_filter import TargetFilter
 
 _MAP_INTERVAL = 0.06  # s between clouds that are entered into the map
 _RECKONED_MEMORY = 0.5  # s, of obstacles in a frame that drifts
+_TRACK = 1.0  # s
 _NEAR_FRAMES = 2  # a lone wrong match is not in two images
 
 
@@ -43,7 +45,7 @@ class PredictivePilot:
         self._filter = TargetFilter(self._p)
         self._ranged = -math.inf  # when the distance was measured last
         self._seen = -math.inf
-        self._sight = np.array([self._p.set_distance, 0.0, 0.0])  # from the camera, when it was seen last
+        self._track = deque()  # of the last second that it was seen: s, m, m/s, m from the camera
         self._search = None
         self._gave_up = False
 
@@ -69,6 +71,7 @@ class PredictivePilot:
         p = self._p
         if scene.stamp - self._seen > p.max_age:
             self._filter = TargetFilter(p)
+            self._track.clear()
         self._seen, self._search, self._gave_up = scene.stamp, None, False
         box = scene.box
         centre = self._camera.centre(scene.then)
@@ -76,10 +79,10 @@ class PredictivePilot:
         expected = math.nan
         if self._filter.started:
             expected = float(np.linalg.norm(self._filter.at(scene.stamp)[0] - centre))
-            self._sight = self._filter.at(scene.stamp)[0] - centre
         distance = self._distance.measure(box, scene.cloud, expected)
         if self._filter.update(scene.stamp, centre, ray, distance):
             self._ranged = scene.stamp
+            self._note(scene.stamp, centre)
         yaw_only = Command(yaw=self._turn_to(ray, scene))
         if not self._filter.started or scene.now - self._ranged > p.max_age:
             return Mode.FOLLOWING, "no depth inside the box", distance, np.zeros(3), yaw_only.yaw, False
@@ -93,6 +96,13 @@ class PredictivePilot:
         closing = -float((velocity - scene.present.velocity) @ sight) / max(away, 1e-3)
         threatened = away < p.set_distance and away - p.minimum_distance < closing * p.threat_time
         return Mode.FOLLOWING, "the target is in view", distance, wanted, command.yaw, threatened
+
+    def _note(self, stamp, centre):
+        """Keep how it was up to a second ago: what is being hidden seems to stop before it is lost."""
+        position, velocity = self._filter.at(stamp)
+        self._track.append((stamp, position, velocity, position - centre))
+        while self._track[0][0] < stamp - _TRACK:
+            self._track.popleft()
 
     def _turn_to(self, ray, scene):
         sight = level(scene.then.yaw).T @ ray
@@ -116,9 +126,10 @@ class PredictivePilot:
         return Mode.SEARCHING, wish.phase.value, wish.velocity, wish.yaw_rate
 
     def _begin_search(self, scene):
-        position, velocity = self._filter.at(self._seen)
+        stamp, position, velocity, sight = self._track[0]
+        position = position + (self._seen - stamp) * velocity * np.array([1.0, 1.0, 0.0])
         heading = level(scene.present.yaw).T @ (position + velocity - self._camera.centre(scene.present))
-        return Search(self._p, self._seen, position, velocity, self._sight, heading[1])
+        return Search(self._p, self._seen, position, velocity, sight, heading[1])
 
     def _remember(self, scene):
         """Enter the cloud into the map; return what is to be kept away from, ndarray (n, 3), odom frame."""

@@ -9,15 +9,16 @@ import numpy as np
 from tld_follower.following.own_motion import level
 
 _FACED = 0.15  # rad
-_LOOK = 1.0  # s, to where the target should be, before it is looked for elsewhere
+_LOOK = 0.7  # s, to where the target should be, before it is looked for from elsewhere
+_ELSEWHERE = 0.8  # m
 _REPLAN = 0.5  # s
 _ANGLES = np.linspace(0, 2 * math.pi, 24, endpoint=False)
 _RADII = (1.2, 2.0)  # set distances, from where the target should be
 _NEARNESS = 0.5  # m of difference to the view that was last for each m on the way
-_RISES = (0.0, 0.5)  # m
+_RISES = (0.0, 0.5, 1.0)  # m
 _THERE = 0.2  # m
 _HIDING = 0.3  # m, farther than this from the sight line a cell hides nothing
-_NEAR_TARGET = 0.7  # m, cells about the target's place do not hide it: they may be it
+_NEAR_TARGET = 0.25  # m, cells about the target's place do not hide it: they may be it
 
 
 class Phase(Enum):
@@ -59,13 +60,14 @@ class Search:
         self._position, self._velocity = position, velocity * np.array([1.0, 1.0, 0.0])
         self._sight = sight * (parameters.set_distance / max(float(np.linalg.norm(sight)), 1e-3))
         self._side = 1.0 if side >= 0 else -1.0
+        self._looked_from = []  # places, odom frame
         self._plan = [Phase.GO, Phase.SWEEP, Phase.CLIMB, Phase.SWEEP]
         self._start(now)
 
     def _start(self, now):
         """Begin the next phase of the plan."""
         self._began, self._goal, self._planned = now, None, -math.inf
-        self._turned, self._yaw = 0.0, None
+        self._turned, self._yaw, self._arrived = 0.0, None, None
 
     def place(self, now):
         """Where the target should be: it drives on for `coast_time`, ndarray (3,), metres."""
@@ -120,10 +122,19 @@ class Search:
             self._goal = self._viewpoint(self.place(now), motion.position, obstacles, safe)
         way = still if self._goal is None else self._goal - motion.position
         distance = float(np.linalg.norm(way))
-        if distance < _THERE:
-            looked = abs(bearing) < _FACED and now - self._lost_at > self._p.coast_time + _LOOK
-            return None if looked else Wish(phase, still, face)
-        return Wish(phase, way / distance * min(self._p.search_speed, 1.5 * distance), face)
+        if distance >= _THERE:
+            self._arrived = None
+            return Wish(phase, way / distance * min(self._p.search_speed, 1.5 * distance), face)
+        if self._goal is None and len(self._looked_from) > 0:
+            return None
+        if self._arrived is None or abs(bearing) > _FACED:
+            self._arrived = now
+        # A target that drives on is flown after; one that should stand there and is not seen is looked for
+        # from elsewhere.
+        if now - self._arrived > _LOOK and now - self._lost_at > self._p.coast_time / 2:
+            self._looked_from.append(motion.position.copy())
+            self._arrived, self._planned = None, -math.inf
+        return Wish(phase, still, face)
 
     @staticmethod
     def _bearing(place, motion, camera):
@@ -146,6 +157,8 @@ class Search:
         spots = np.array([ideal, *around])
         cost = np.linalg.norm(spots - ideal, axis=1) + _NEARNESS * np.linalg.norm(spots - position, axis=1)
         for spot in spots[np.argsort(cost)]:
+            if any(np.linalg.norm(spot - been) < _ELSEWHERE for been in self._looked_from):
+                continue
             if safe.reaches(position, spot, obstacles) and _sees(spot, place, obstacles):
                 return spot
         return None
