@@ -51,8 +51,9 @@ def test_the_whole_graph(result):
     assert (flight["resolution"], flight["rate_hz"], flight["frames"]) == ("640x480", 30.0, 6)
     assert flight["real_time_factor"] > 0
     assert 0 <= flight["skipped_frames"] <= 6
+    assert 0 <= flight["followed_frames"] <= 6
     latency = flight["latency_ms"]
-    assert 1.0 < latency["p50"] <= latency["p99"]
+    assert latency["p50"] is None or 1.0 < latency["p50"] <= latency["p99"]
     assert {"/gazebo", "/NODE", "/pointsdepthA", "/stereo/stereo_image_proc"} < set(
         flight["cpu_ms_per_frame"]
     )
