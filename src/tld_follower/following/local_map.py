@@ -155,21 +155,10 @@ def _clear(sightings, known, cloud, corner, to_optical, focal, far):
 
 
 @njit(cache=True)
-def _seen_beside(sightings, i, j, k):
-    """Return 1 if a cell beside this one was seen occupied: what moves is in another cell in each cloud."""
-    for a in range(max(i - 1, 0), min(i + 2, sightings.shape[0])):
-        for b in range(max(j - 1, 0), min(j + 2, sightings.shape[1])):
-            if sightings[a, b, k]:
-                return 1
-    return 0
-
-
-@njit(cache=True)
 def _enter(occupied, sightings, cloud, turn, centre, reach, target, extent):
     """Mark cells that hold a quarter of the points that a filled one would, and three at least."""
     focal, far, now = reach
     radius, before = extent
-    before_this = sightings.copy()
     counts = np.zeros(occupied.shape, np.int32)
     depths = np.zeros(occupied.shape, np.float32)
     stride = max(1, cloud.shape[1] // _ACROSS)
@@ -194,8 +183,7 @@ def _enter(occupied, sightings, cloud, turn, centre, reach, target, extent):
                     edge = CELL * focal / depths[i, j, k] / stride
                     if counts[i, j, k] >= 0.25 * edge * edge:
                         occupied[i, j, k] = now
-                        near = _seen_beside(before_this, i, j, k)
-                        sightings[i, j, k] = min(max(sightings[i, j, k], near) + 1, 120)
+                        sightings[i, j, k] = min(sightings[i, j, k] + 1, 120)
 
 
 def warm_up():

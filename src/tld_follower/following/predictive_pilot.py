@@ -20,7 +20,7 @@ from tld_follower.following.target_filter import TargetFilter
 _MAP_INTERVAL = 0.06  # s between clouds that are entered into the map
 _RECKONED_MEMORY = 0.5  # s, of obstacles in a frame that drifts
 _TRACK = 1.0  # s
-_NEAR_FRAMES = 2  # a lone wrong match is not in two images
+_NEAR_FRAMES = 3  # a lone wrong match is not in three images
 
 
 class PredictivePilot:
