@@ -139,8 +139,9 @@ class SafeMotion:
         flat /= np.maximum(share, 1e-9)[:, None]
         steps = np.arange(_STEP, self._p.body_radius + 2.0, _STEP)
         places = (position + steps[None, :, None] * flat[:, None, :]).reshape(-1, 3)
-        # Near the drone, the camera sees what is a little lower.
-        known = local_map.known(places) | local_map.known(places - [0.0, 0.0, 1.5 * self._p.body_height])
+        # Near the vehicle, the camera sees what is a little lower than a drone, or higher than an axle.
+        shift = self._p.camera_z / 2 if self._grounded else -1.5 * self._p.body_height
+        known = local_map.known(places) | local_map.known(places + np.array([0.0, 0.0, shift]))
         known = known.reshape(len(directions), -1)
         first = np.where(known.all(axis=1), np.inf, steps[np.argmin(known, axis=1)] - self._p.body_radius)
         speed = np.maximum(self._stopping_speed(np.maximum(first, 0.0)), self._p.unknown_speed)
