@@ -14,7 +14,6 @@ from geometry_msgs.msg import Twist
 from std_srvs.srv import Empty
 
 from tld_follower.evaluation.graph import (
-    DEPTH_EDGE,
     FLYING_EDGES,
     edges,
     launched,
@@ -84,12 +83,12 @@ class ReplayTest(unittest.TestCase):
             "resolution": "320x240",
             "init_box": f"{box.x},{box.y},{box.width},{box.height}",
             "tracker": "tld_sift",
-            "use_depth": "true",
+            "use_depth": "false",
         }
         unused = {("/teleop_twist_keyboard", "/husky/cmd_vel", "/gazebo")}
         with launched("tracking.launch", tracking, self.folder / "tracking.log") as alive:
             with launched("record.launch", {"bag": bag}, self.folder / "record.log") as recording:
-                wait_for_edges((FLYING_EDGES | {DEPTH_EDGE}) - unused, timeout=WAIT, alive=alive)
+                wait_for_edges(FLYING_EDGES - unused, timeout=WAIT, alive=alive)
                 wait_for(
                     lambda: set(RECORDED) <= {t for _, t, node in edges() if node == "/recorder"},
                     "the recorder",
