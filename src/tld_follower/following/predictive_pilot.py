@@ -12,7 +12,7 @@ from tld_follower.following.distance import make_distance
 from tld_follower.following.local_map import LocalMap
 from tld_follower.following.own_motion import level
 from tld_follower.following.predictive import PredictiveController
-from tld_follower.following.safe_motion import SafeMotion
+from tld_follower.following.safe_motion import SafeMotion, Way
 from tld_follower.following.search import Search
 from tld_follower.following.state import Mode, State
 from tld_follower.following.target_filter import TargetFilter
@@ -60,11 +60,11 @@ class PredictivePilot:
         else:
             mode, reason, velocity, yaw_rate = self._recover(scene, obstacles)
             distance, threatened = math.nan, False
-        command, hindrance = self._fly(velocity, yaw_rate, scene, nearest, obstacles, threatened)
-        if hindrance.startswith("something"):
+        command, way = self._fly(velocity, yaw_rate, scene, nearest, obstacles, threatened)
+        if way.avoiding:
             mode = Mode.AVOIDING
         return State(
-            mode, hindrance or reason, distance, nearest.distance, command, self._target_velocity(scene)
+            mode, way.reason or reason, distance, nearest.distance, command, self._target_velocity(scene)
         )
 
     def _follow(self, scene):
@@ -83,9 +83,9 @@ class PredictivePilot:
         if self._filter.update(scene.stamp, centre, ray, distance):
             self._ranged = scene.stamp
             self._note(scene.stamp, centre)
-        yaw_only = Command(yaw=self._turn_to(ray, scene))
         if not self._filter.started or scene.now - self._ranged > p.max_age:
-            return Mode.FOLLOWING, "no depth inside the box", distance, np.zeros(3), yaw_only.yaw, False
+            turn = self._turn_to(ray, scene)
+            return Mode.FOLLOWING, "no depth inside the box", distance, np.zeros(3), turn, False
         position, velocity = self._filter.at(scene.now)
         command = self._controller.command(
             position, velocity, scene.present, self._camera, self._own.measured
@@ -123,7 +123,9 @@ class PredictivePilot:
         if wish is None:
             self._gave_up = True
             return self._recover(scene, obstacles)
-        return Mode.SEARCHING, wish.phase.value, wish.velocity, wish.yaw_rate
+        # Without a cloud nothing is known about the way: it turns and climbs only.
+        velocity = wish.velocity if scene.cloud is not None else wish.velocity * [0.0, 0.0, 1.0]
+        return Mode.SEARCHING, wish.phase.value, velocity, wish.yaw_rate
 
     def _begin_search(self, scene):
         stamp, position, velocity, sight = self._track[0]
@@ -155,9 +157,9 @@ class PredictivePilot:
         return surface, radius
 
     def _fly(self, velocity, yaw_rate, scene, nearest, obstacles, threatened):
-        """Make a wanted velocity (odom frame) safe; return the command and what hinders it."""
+        """Make a wanted velocity (odom frame) safe; return the command and the `Way` that was chosen."""
         present = scene.present
-        reason = ""
+        way = Way(velocity)
         if scene.cloud is not None:
             soon = self._trend.ahead(scene.cloud_stamp, nearest.distance)
             near = soon < self._p.minimum_distance + self._p.near_margin
@@ -166,9 +168,8 @@ class PredictivePilot:
                 obstacles = np.vstack([obstacles, self._place(nearest, soon, scene)])
             heading = level(present.yaw)[:, 0]
             way = self._safe.choose(velocity, present.position, heading, self._map, obstacles, threatened)
-            velocity, reason = way.velocity, way.reason
-        x, y, z = level(present.yaw).T @ velocity
-        return Command(float(x), float(y), float(z), float(yaw_rate)), reason
+        x, y, z = level(present.yaw).T @ way.velocity
+        return Command(float(x), float(y), float(z), float(yaw_rate)), way
 
     def _place(self, nearest, soon, scene):
         """Return the place of the nearest thing, odom frame; inside the free zone if it must be left."""

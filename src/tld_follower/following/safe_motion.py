@@ -17,10 +17,14 @@ _NOT_DOWN = _DIRECTIONS[_DIRECTIONS[:, 2] >= 0]  # a way around does not lead to
 
 @dataclass(frozen=True)
 class Way:
-    """A velocity that may be flown, m/s in the odom frame, and why it is not the wanted one ("" if it is)."""
+    """A velocity that may be flown, m/s in the odom frame, and why it is not the wanted one ("" if it is).
+
+    `avoiding` tells an obstacle from mere caution.
+    """
 
     velocity: np.ndarray
     reason: str = ""
+    avoiding: bool = False
 
 
 class SafeMotion:
@@ -76,7 +80,7 @@ class SafeMotion:
         stop = np.minimum(stop, speed)
         if stop[0] > speed - _CHANGED:
             return Way(wanted * (stop[0] / speed))
-        hindered = self._stopping_speed(free[:1])[0] < speed - _CHANGED
+        hindered = bool(self._stopping_speed(free[:1])[0] < speed - _CHANGED)
         best = 0
         if hindered and stop[0] < _DETOUR * speed:
             progress = stop * (directions @ directions[0])
@@ -84,7 +88,7 @@ class SafeMotion:
             if progress[best] < 1.2 * stop[0] + _CHANGED:
                 best = 0
         reason = "something is in the way" if hindered else "space ahead was not seen yet"
-        return Way(directions[best] * stop[best], reason)
+        return Way(directions[best] * stop[best], reason, hindered)
 
     def _relative(self, obstacles, position):
         """Obstacles about the vehicle, in the frame in which its free zone is a ball."""
@@ -100,7 +104,7 @@ class SafeMotion:
         away = -(relative[inside] / np.maximum(distances[inside], 1e-3)[:, None] * depth[:, None]).sum(axis=0)
         length = float(np.linalg.norm(away))
         if length < 1e-6:
-            return Way(np.zeros(3), "something is too near")
+            return Way(np.zeros(3), "something is too near", True)
         away /= length
         directions = np.vstack([away * self._scale, _DIRECTIONS])
         if self._grounded:
@@ -113,8 +117,8 @@ class SafeMotion:
         score = usable * ((directions * self._scale) @ away) * np.where(known, 1.0, 0.7)
         best = int(np.argmax(score))
         if score[best] <= 0:
-            return Way(np.zeros(3), "something is too near")
-        return Way(directions[best] * usable[best], "something is too near")
+            return Way(np.zeros(3), "something is too near", True)
+        return Way(directions[best] * usable[best], "something is too near", True)
 
     def _free(self, relative, directions):
         """How far the drone can go in each direction before an obstacle enters the ellipsoid, metres."""

@@ -288,3 +288,15 @@ def test_a_trend_tells_what_comes_on_from_what_jumps():
     assert [trend.ahead((7 + n) / RATE, 0.4 + 0.05 * n) for n in range(6)][-1] == pytest.approx(
         0.65
     )  # leaves
+
+
+def test_a_search_without_clouds_turns_and_climbs_only():
+    world = hovering(replace(PARAMETERS, distance="box"))
+    states = []
+    for _ in range(round(12 * RATE)):
+        t = world.time
+        states.append(world.follower.update(None, 1, t, t, None, -math.inf))
+        world.fly(states[-1].command)
+    assert Mode.SEARCHING in {state.mode for state in states}
+    assert all(state.command.x == state.command.y == 0 for state in states)
+    assert any(state.command.yaw for state in states)

@@ -1,20 +1,10 @@
 import threading
 
-import pytest
 import rospy
 from sensor_msgs.msg import PointCloud2
 
 from tld_follower.nodes import by_stamp
 from tld_follower.nodes.by_stamp import ByStamp
-
-
-@pytest.fixture
-def clock(monkeypatch):
-    """ROS time as a list of one number, which tests set [s]."""
-    now = [100.0]
-    monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time.from_sec(now[0])))
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
-    return now
 
 
 def cloud(seconds):

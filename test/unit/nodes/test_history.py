@@ -1,17 +1,7 @@
-import pytest
 import rospy
 from nav_msgs.msg import Odometry
 
 from tld_follower.nodes.history import History
-
-
-@pytest.fixture
-def clock(monkeypatch):
-    """ROS time as a list of one number, which tests set [s]."""
-    now = [100.0]
-    monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time.from_sec(now[0])))
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
-    return now
 
 
 def odometry(seconds):
